@@ -10,7 +10,7 @@ use std::time::Instant;
 
 use clap::Parser;
 use starlings_coordinator::explain::{
-    Context, ExplainError, Explanation, Options, check, explain, load_findings, save_findings,
+    Context, ExplainError, Explanation, Findings, Options, check, explain, load_findings, save_findings,
 };
 use starlings_coordinator::report::{self, FilesError};
 use starlings_coordinator::study::store::Purpose;
@@ -133,11 +133,14 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
     let earlier_s = folder.store.elapsed_s().map_err(Failure::run)?;
     let mut context = Context { clock: &clock, watch: &mut watch, events: Some(&session.events), earlier_s };
     let result = explain(&study, &mut session.fleet, &folder.store, &mut context, &options);
-    display.finish();
+    if result.is_err() {
+        display.finish();
+    }
     let page = session.close(result.is_ok());
     let found = result.map_err(|error| failed(&error, &folder.path))?;
-    save_findings(&folder, &found).map_err(Failure::run)?;
-    let written = write(&folder, args.json);
+    let written = save_findings(&folder, &found).map_err(Failure::run).and_then(|()| files(&folder));
+    display.finish();
+    let written = written.and_then(|found| told(&found, &folder, args.json));
     finish(page, Some(&folder.path.join("report.html")));
     folder.rest();
     written
@@ -164,10 +167,19 @@ fn failed(error: &ExplainError, folder: &Path) -> Failure {
 
 /// Writes the files of a finished explanation and prints its answer.
 pub(crate) fn write(folder: &RunFolder, json: bool) -> Result<(), Failure> {
-    let found = report::write_explanation(folder).map_err(|error| match error {
+    told(&files(folder)?, folder, json)
+}
+
+/// Writes the files of a finished explanation.
+fn files(folder: &RunFolder) -> Result<Findings, Failure> {
+    report::write_explanation(folder).map_err(|error| match error {
         FilesError::Unfinished(_) => Failure::input(error),
         _ => Failure::run(error),
-    })?;
+    })
+}
+
+/// Prints the answer of an explanation.
+fn told(found: &Findings, folder: &RunFolder, json: bool) -> Result<(), Failure> {
     if json {
         return as_json(&found.explanation);
     }

@@ -10,9 +10,9 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 use starlings_coordinator::fleet::FleetEvent;
-use starlings_coordinator::live::{Live, Pace, Standing};
+use starlings_coordinator::infer;
+use starlings_coordinator::live::{Live, Pace, Reach, Standing};
 use starlings_coordinator::study::{Progress, Stage};
-use starlings_coordinator::{infer, study};
 
 use form::Form;
 use told::Told;
@@ -26,8 +26,8 @@ struct Known {
     pace: Pace,
     /// What was told then; nothing before the work begins and after it ends.
     told: Option<Told>,
-    /// Work that was done by then.
-    done: f64,
+    /// Share of the next batch that was done by then.
+    share: f64,
 }
 
 /// Shows where a command stands.
@@ -81,9 +81,8 @@ impl Display {
     /// So much of the batch is done of which was told last.
     fn batch(&self, share: f64) {
         let mut known = self.known();
-        let next = known.told.as_ref().map(Told::work).filter(|work| work.next > 0.0 && share < 1.0);
-        if let Some(work) = next {
-            known.done = known.done.max(work.done + share * work.next);
+        if known.told.as_ref().is_some_and(|told| told.work().next > 0.0) && share < 1.0 {
+            known.share = known.share.max(share);
             self.show(known, false);
         }
     }
@@ -114,8 +113,7 @@ impl Display {
         let mut known = self.known();
         let is_edge = is_edge(known.told.as_ref());
         let told = told.after(known.told.take());
-        let study::Work { done, .. } = told.work();
-        (known.done, known.told) = (done, Some(told));
+        (known.share, known.told) = (0.0, Some(told));
         self.show(known, is_edge);
     }
 
@@ -154,9 +152,7 @@ impl Known {
     /// Where the work stands at this time, s.
     fn at(&mut self, now_s: f64) -> Option<Standing> {
         let told = self.told.as_ref()?;
-        let total = told.work().total;
-        let left_s = self.pace.left(now_s, self.done, total);
-        let share = (total > 0.0).then(|| (self.done / total).clamp(0.0, 1.0));
+        let Reach { share, left_s } = self.pace.at(now_s, &told.work().with_batch(self.share));
         Some(Standing { share, left_s, ..told.in_words() })
     }
 }

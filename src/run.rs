@@ -95,10 +95,10 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
         threads: std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
     };
     let result = study_run::run(&study, &mut session.fleet, &mut folder, &mut context);
-    display.finish();
     let page = session.close(result.is_ok());
     let path = folder.path.display();
     let summary = result.map_err(|error| {
+        display.finish();
         let remedy = format!("the run so far is in {path}: continue it with --out {path} --resume");
         if error.is_cancelled() {
             return interrupt::failure(&remedy);
@@ -106,12 +106,20 @@ pub(crate) fn run(args: &Args, started: Instant) -> Result<(), Failure> {
         let moved = if error.misses_a_piece() { &*moved } else { "" };
         Failure::run(format!("{error}{moved}\n  {remedy}"))
     })?;
-    end(&summary, &folder, page, args.json)
+    end(&summary, &folder, page, &display, args.json)
 }
 
 /// Writes and prints the result, and leads the live page to its report.
-fn end(summary: &Summary, folder: &RunFolder, page: Option<LivePage>, json: bool) -> Result<(), Failure> {
-    report::write_files(folder).map_err(Failure::run)?;
+fn end(
+    summary: &Summary,
+    folder: &RunFolder,
+    page: Option<LivePage>,
+    display: &Display,
+    json: bool,
+) -> Result<(), Failure> {
+    let written = report::write_files(folder);
+    display.finish();
+    written.map_err(Failure::run)?;
     let printed = print(summary, &folder.path, json);
     finish(page, Some(&folder.path.join("report.html")));
     folder.rest();

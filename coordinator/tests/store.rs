@@ -103,9 +103,9 @@ fn a_resumed_run_keeps_its_clock_its_counts_and_one_row_per_job() {
     assert_eq!(summary.runs, whole.summary.runs);
     assert_eq!(steps.first(), Some(&(2, 6, 18 * 4)), "seventeen analyses were there already");
     assert_eq!((steps.len(), steps.last().copied()), (7, Some((2, 12, 96))));
-    // The final run, no observer, no constants, one run beside the estimate per parameter and one at it.
+    // The final run, no observer, no constants, one run beside the estimate per parameter and one at it; the files.
     let runs: Vec<u64> = afterwards.iter().map(|told| told.2).collect();
-    assert_eq!((runs[0], runs.len()), (96, 4), "runs of the part before the resume count");
+    assert_eq!((runs[0], runs.len()), (96, 5), "runs of the part before the resume count");
     assert!(runs.is_sorted() && runs[3] > 96, "{runs:?}");
     let rows = |folder: &RunFolder, table, columns| {
         starlings_coordinator::study::store::table(&folder.store, table, columns).unwrap()

@@ -15,8 +15,10 @@ use crate::log;
 /// Spacing of plain lines.
 const LINE_EVERY: Duration = Duration::from_secs(10);
 
-/// Spacing of records for programs.
+/// Spacing of records for programs ...
 const RECORD_EVERY: Duration = Duration::from_millis(250);
+/// ... and this part of the time so far while that is shorter, so that a command of a second tells its end too.
+const OF_TIME: u32 = 50;
 
 /// Parts of a bar.
 const PARTS: f64 = 10_000.0;
@@ -30,8 +32,8 @@ pub(super) enum Form {
     Silent,
     /// A line now and then, at the edge of a stage always; the time of the last one.
     Lines(Mutex<Instant>),
-    /// Records for programs, a few a second; the time of the last one.
-    Records(Mutex<Option<Instant>>),
+    /// Records for programs, a few a second; when they began, and the time of the last one.
+    Records(Instant, Mutex<Option<Instant>>),
     /// A bar.
     Bar(ProgressBar),
 }
@@ -39,7 +41,7 @@ pub(super) enum Form {
 impl Form {
     pub(super) fn new(silent: bool) -> Self {
         if log::is_json() {
-            return Self::Records(Mutex::new(None));
+            return Self::Records(Instant::now(), Mutex::default());
         }
         if silent {
             return Self::Silent;
@@ -66,8 +68,10 @@ impl Form {
                     *last = Instant::now();
                 }
             }
-            Self::Records(last) if is_edge || is_due(last) => record(&format!("{head}, {tail}")),
-            Self::Silent | Self::Records(_) => {}
+            Self::Records(began, last) if is_edge || is_due(*began, last) => {
+                record(&format!("{head}, {tail}"));
+            }
+            Self::Silent | Self::Records(..) => {}
             Self::Bar(bar) => {
                 bar.set_length(PARTS as u64);
                 bar.set_prefix(head);
@@ -80,7 +84,7 @@ impl Form {
     pub(super) fn say(&self, text: &str) {
         match self {
             Self::Silent => {}
-            Self::Lines(_) | Self::Records(_) => note(format_args!("{text}")),
+            Self::Lines(_) | Self::Records(..) => note(format_args!("{text}")),
             Self::Bar(bar) => bar.suspend(|| note(format_args!("{text}"))),
         }
     }
@@ -102,9 +106,10 @@ fn rest(standing: &Standing) -> String {
 }
 
 /// Whether the last record was told long enough ago; then another one is told now.
-fn is_due(last: &Mutex<Option<Instant>>) -> bool {
+fn is_due(began: Instant, last: &Mutex<Option<Instant>>) -> bool {
     let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
-    let is_due = last.is_none_or(|at| at.elapsed() > RECORD_EVERY);
+    let spacing = RECORD_EVERY.min(began.elapsed() / OF_TIME);
+    let is_due = last.is_none_or(|at| at.elapsed() > spacing);
     if is_due {
         *last = Some(Instant::now());
     }

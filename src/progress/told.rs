@@ -20,11 +20,11 @@ pub(super) enum Told {
 
 impl Told {
     /// How much of the work is done.
-    pub(super) fn work(&self) -> Work {
+    pub(super) fn work(&self) -> &Work {
         match self {
-            Self::Step(at) => at.work,
-            Self::Stage(at) => at.work,
-            Self::Blocks(at) => at.work,
+            Self::Step(at) => &at.work,
+            Self::Stage(at) => &at.work,
+            Self::Blocks(at) => &at.work,
         }
     }
 
@@ -91,10 +91,6 @@ fn step(at: &Progress) -> Standing {
         Some(passes) if passes > 1 => format!("pass {}/{passes}", at.pass),
         Some(_) => at.stage.to_owned(),
     };
-    let (stage, says) = if at.is_analysis() {
-        (stage, format!("{} of {} analyses", at.step, at.steps))
-    } else {
-        (at.stage.to_owned(), format!("{} of {} ensembles after the fit", at.step, at.steps))
-    };
-    Standing { stage, says, runs: at.runs, workers: at.workers, ..Standing::default() }
+    let stage = if at.is_after_fit() { at.stage.to_owned() } else { stage };
+    Standing { stage, says: at.says(), runs: at.runs, workers: at.workers, ..Standing::default() }
 }

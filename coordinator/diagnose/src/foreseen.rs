@@ -44,6 +44,6 @@ impl Foreseen {
         let (done, next) = (runs as f64, next as f64);
         let of = |part: usize| self.parts.get(part).copied().unwrap_or(0.0);
         let later: f64 = (self.part + 1..self.parts.len()).map(of).sum();
-        Work { done, next, total: (self.before + of(self.part)).max(done + next) + later }
+        Work::of_runs(done, next, (self.before + of(self.part)).max(done + next) + later)
     }
 }

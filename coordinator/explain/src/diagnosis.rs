@@ -23,7 +23,7 @@ use crate::judge::verdict::{Decision, Verdict, decide, limits};
 use crate::locate::{self, Track, UnknownInput};
 use crate::options::Options;
 use crate::refit::search::{first_kinds, search, search_further};
-use crate::run_cache::{Point, RunCache};
+use crate::run_cache::{Course, Point, RunCache};
 use crate::screen::candidates::candidates;
 use crate::screen::proposals::{self, Proposals};
 use crate::screen::residual_timing::{change_points, periods};
@@ -88,6 +88,7 @@ pub(super) fn diagnose<R>(
                 cache.rows.noise = noise;
                 continue;
             }
+            cache.foreseen.goes(Course::Over);
             let candidates = proposed.get().unwrap_or(&candidates);
             return then(cache, Diagnosis { found, candidates, decision, tracks: &tracks, forces });
         }

@@ -12,7 +12,7 @@ use rand_distr::{Distribution, StandardNormal};
 use starlings_estimators::quantiles::wilson;
 use starlings_fleet::Fleet;
 use starlings_study::store::Store;
-use starlings_study::{Stage, Study, Work};
+use starlings_study::{Stage, Study};
 
 use crate::diagnosis::diagnose;
 use crate::error::ExplainError;
@@ -23,13 +23,13 @@ use crate::run_cache::{Foreseen, RunCache};
 use crate::tell::result::Nulls;
 
 /// Searches `options.nulls` simulated recordings. `fitted` is what the fitted model as it is predicts, by row, and the rows with their
-/// noise; `before` the runs of the search so far.
+/// noise; `foreseen` what of the work is done.
 ///
 /// # Errors
 /// When the fleet or the store fails. A simulated recording whose fit does not converge counts as one without a name.
 pub(super) fn measure(
     study: &Study,
-    (fitted, before): (&(Arc<Vec<f64>>, Rows), u64),
+    (fitted, foreseen): (&(Arc<Vec<f64>>, Rows), &Foreseen),
     fleet: &mut dyn Fleet,
     store: &Store,
     context: &mut Context<'_>,
@@ -40,10 +40,7 @@ pub(super) fn measure(
     for k in 0..nulls.of {
         let simulated = simulated(study, fitted, &mut random(study.seed, k as u64));
         let says = format!("{} of {} recordings without a gap", k + 1, nulls.of);
-        let (done, runs) = (before + nulls.runs, nulls.runs);
-        let each = if k > 0 { runs as f64 / k as f64 } else { Foreseen::of_null(before as f64) };
-        let total = each.mul_add((nulls.of - k) as f64, done as f64);
-        let work = Work { done: done as f64, next: 0.0, total };
+        let (work, runs) = (foreseen.null(k, nulls.runs), nulls.runs);
         (context.watch)(&Stage { name: "null", says, runs, workers: fleet.n_workers(), work });
         let mut quiet = |_: &Stage| {};
         let mut inner = Context {

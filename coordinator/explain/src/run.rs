@@ -57,10 +57,10 @@ pub fn explain(
         let fitted = (Arc::clone(&diagnosis.found.base.predicted), cache.rows.clone());
         Ok((finish(cache, &diagnosis)?, fitted))
     })?;
+    let foreseen = cache.foreseen.clone();
     drop(cache);
-    let runs = findings.explanation.runs;
     if options.nulls > 0 {
-        let nulls = null_recordings::measure(&free, (&fitted, runs), fleet, store, context, options)?;
+        let nulls = null_recordings::measure(&free, (&fitted, &foreseen), fleet, store, context, options)?;
         findings.explanation.runs += nulls.runs;
         findings.explanation.runs_by_stage.push(("null".to_owned(), nulls.runs));
         findings.explanation.false_alarm.nulls = Some(nulls);

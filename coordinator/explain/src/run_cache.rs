@@ -22,7 +22,7 @@ use starlings_models::Window;
 use starlings_study::store::{RunKey, Store, StoreError};
 use starlings_study::{Stage, Study};
 
-pub(crate) use self::foreseen::Foreseen;
+pub(crate) use self::foreseen::{Course, Foreseen};
 use self::lru::LruCache;
 use crate::error::ExplainError;
 use crate::options::{Context, HOLD};
@@ -59,7 +59,7 @@ pub struct RunCache<'a> {
     hold: usize,
     budget: Option<u64>,
     stage: &'static str,
-    /// How many runs there will be.
+    /// How much there is still to do.
     pub(crate) foreseen: Foreseen,
     runs: Vec<(&'static str, u64)>,
     workers: BTreeSet<String>,
@@ -79,9 +79,11 @@ impl<'a> RunCache<'a> {
         budget: Option<u64>,
     ) -> Self {
         let windows = (0..study.records.len()).map(|r| Arc::new(study.whole(r, false))).collect();
+        let rows = Rows::new(study);
+        let foreseen = Foreseen::new(study, rows.rows.len());
         Self {
             study,
-            rows: Rows::new(study),
+            rows,
             fleet,
             store,
             clock: context.clock,
@@ -94,7 +96,7 @@ impl<'a> RunCache<'a> {
             hold: HOLD,
             budget,
             stage: "fit",
-            foreseen: Foreseen::new(study),
+            foreseen,
             runs: Vec::new(),
             workers: BTreeSet::new(),
             n_batch: 0,
@@ -121,7 +123,7 @@ impl<'a> RunCache<'a> {
     /// Begins a stage and reports it.
     pub(crate) fn stage(&mut self, name: &'static str, says: &str) {
         self.stage = name;
-        self.foreseen.stage(name, self.runs());
+        self.foreseen.stage(name);
         self.report_stage(says, 0);
     }
 
@@ -129,7 +131,7 @@ impl<'a> RunCache<'a> {
     fn report_stage(&mut self, says: &str, next: usize) {
         // Those that are made next are counted already.
         let (runs, workers) = (self.runs().saturating_sub(next as u64), self.fleet.n_workers());
-        let work = self.foreseen.work(runs, next);
+        let work = self.foreseen.work(next);
         (self.watch)(&Stage { name: self.stage, says: says.to_owned(), runs, workers, work });
     }
 
@@ -145,6 +147,7 @@ impl<'a> RunCache<'a> {
 
     /// Counts runs that were made on the fleet without this cache.
     pub(crate) fn count(&mut self, n: u64) {
+        self.foreseen.count(n);
         match self.runs.iter_mut().find(|(name, _)| *name == self.stage) {
             Some((_, count)) => *count += n,
             None => self.runs.push((self.stage, n)),

@@ -3,8 +3,8 @@
 //! Next file to read: `run.rs`.
 
 use starlings_fleet::Fleet;
-use starlings_study::Work;
 use starlings_study::infer_choice::{InferChoice, MeasuredChoice};
+use starlings_study::{Part, Takes, Work};
 
 use crate::blocks::{Cut, Start, length};
 
@@ -38,8 +38,8 @@ pub(crate) struct Teller<'a> {
     n_step: f64,
     /// Steps of recordings that are done with.
     before: f64,
-    /// Work of the smoothing.
-    smoothing: f64,
+    /// Rounds of the smoothing that are expected.
+    rounds: f64,
     last: Progress,
 }
 
@@ -55,17 +55,16 @@ impl<'a> Teller<'a> {
         let n_step: f64 = records.map(|record| length(record) as f64 / at.per_row).sum();
         let is_smoothed = matches!(choice.measured, MeasuredChoice::Known(_));
         let last = Progress { stage: "", says: String::new(), n_block: 0, workers: 0, work: Work::default() };
-        let smoothing = if is_smoothed { ROUNDS * ROUND * n_step } else { 0.0 };
-        Self { watch, block: cut.block as f64, n_step, before: 0.0, smoothing, last }
+        let rounds = if is_smoothed { ROUNDS } else { 0.0 };
+        Self { watch, block: cut.block as f64, n_step, before: 0.0, rounds, last }
     }
 
     /// So many blocks of the recordings that are read have sums, with so many steps; as many as `next` are being made.
     pub(crate) fn sums(&mut self, n_block: u64, n_step: u64, next: usize, fleet: &dyn Fleet) {
         let done = self.before + n_step as f64;
         let next = (next as f64 * self.block).min((self.n_step - done).max(0.0));
-        let total = self.n_step.max(done) + self.smoothing;
         let says = format!("{done:.0} of about {:.0} steps", self.n_step.max(done));
-        let work = Work { done, next, total };
+        let work = self.work([done, (self.n_step - done).max(0.0)], [0.0, self.rounds], 0, next);
         self.tell(Progress { stage: "sums", says, n_block, workers: fleet.n_workers(), work });
     }
 
@@ -79,17 +78,24 @@ impl<'a> Teller<'a> {
     pub(crate) fn round(&mut self, log_likelihood: &[f64], tolerance: f64, most: usize) {
         let n = log_likelihood.len() as f64;
         let rounds = rounds(log_likelihood, tolerance).clamp(n + 1.0, (most as f64).max(n + 1.0));
-        let each = ROUND * self.n_step;
-        let work = Work { done: self.before + n * each, next: each, total: self.before + rounds * each };
+        let work = self.work([self.before, 0.0], [n, rounds - n], 1, 1.0);
         let says = format!("round {} of about {rounds:.0}", n + 1.0);
         self.tell(Progress { stage: "smoothing", says, work, ..self.last.clone() });
     }
 
     /// What is left is small.
     pub(crate) fn posterior(&mut self) {
-        let total = self.last.work.total;
-        let work = Work { done: total, next: 0.0, total };
+        let mut work = Work { next: 0.0, ..self.last.work.clone() };
+        for part in &mut work.parts {
+            (part.done, part.left) = (part.done + part.left, 0.0);
+        }
         self.tell(Progress { stage: "posterior", says: String::new(), work, ..self.last.clone() });
+    }
+
+    /// Done and left of the steps and of the rounds; `next` of the kind that goes on.
+    fn work(&self, steps: [f64; 2], rounds: [f64; 2], at: usize, next: f64) -> Work {
+        let part = |weight, [done, left]: [f64; 2]| Part { takes: Takes::Runs(weight), done, left };
+        Work { parts: vec![part(1.0, steps), part(ROUND * self.n_step, rounds)], at, next, ends: true }
     }
 
     fn tell(&mut self, at: Progress) {

@@ -10,7 +10,7 @@ use starlings_study::store::folder::FolderError;
 use starlings_study::{RunFolder, Work, progress};
 
 use super::course::Course;
-use super::pace::Pace;
+use super::pace::{Pace, Reach};
 use super::view::{Counted, EventView, Head, Standing, State, View};
 
 /// Events that are shown.
@@ -114,15 +114,14 @@ impl Watched {
 
     fn standing(&mut self, noted: Noted, elapsed_s: f64, state: State) -> Standing {
         let Staged { name: stage, says, runs, workers, work } = noted.in_words();
-        let Work { done, total, .. } = work;
         let is_running = state == State::Running;
-        let left_s = self.pace.left(elapsed_s, done, total).filter(|_| is_running);
-        let share = if state == State::Finished { 1.0 } else { (done / total).clamp(0.0, 1.0) };
+        let Reach { share, left_s } = self.pace.at(elapsed_s, &work);
+        let share = share.map(|share| if state == State::Finished { 1.0 } else { share });
         Standing {
             stage,
             says,
-            share: (total > 0.0).then_some(share),
-            left_s,
+            share,
+            left_s: left_s.filter(|_| is_running),
             runs,
             counted: Counted::Runs,
             workers: if is_running { workers } else { 0 },
@@ -137,12 +136,8 @@ impl Noted {
             Self::Run(analysed) => analysed,
         };
         let is_last = progress::LAST.contains(&of.stage.as_str());
-        let (name, what) = if is_last {
-            (of.stage, "ensembles after the fit")
-        } else {
-            (format!("pass {}", of.pass), "analyses")
-        };
-        let says = format!("{} of {} {what}", of.step, of.steps);
+        let says = progress::says(&of.stage, of.step, of.steps);
+        let name = if is_last { of.stage } else { format!("pass {}", of.pass) };
         Staged { name, says, runs: of.runs, workers: of.workers, work: of.work }
     }
 }

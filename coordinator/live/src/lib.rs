@@ -15,7 +15,7 @@ pub mod view;
 
 pub use course::Course;
 pub use folder::Watched;
-pub use pace::Pace;
+pub use pace::{Pace, Reach};
 pub use serve::{Live, LivePage};
 pub use told::Told;
 pub use view::{Counted, Head, Standing, State, View};

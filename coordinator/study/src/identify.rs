@@ -41,7 +41,7 @@ pub fn identify(
     let (beside, constants) = ((2 * study.parameters.len() + 1) as f64, constants::n_run(study) as f64);
     let total = records * (beside + constants);
     let mut tell = |runner: &EnsembleRunner<'_>, name, says: String, [done, next]: [f64; 2]| {
-        let work = Work { done: records * done, next: records * next, total };
+        let work = Work::of_runs(records * done, records * next, total);
         watch(&Stage { name, says, runs: runner.counts.total, workers: runner.n_workers(), work });
     };
     let n = study.parameters.len();

@@ -58,4 +58,4 @@ pub use solver_host::{SolverHost, Undescribed};
 pub use states::recombine_by;
 pub use store::folder::{FolderError, RunFolder};
 pub use summary::Summary;
-pub use work::Work;
+pub use work::{Part, Takes, Work};

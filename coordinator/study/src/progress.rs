@@ -58,13 +58,35 @@ impl Stage {
 pub const PROGRESS: &str = "progress";
 
 /// The runs after a fit, in their order: with the estimate, with the observer, with constants moved, beside the estimate, with draws of
-/// the posterior.
-pub const LAST: [&str; 5] = ["final run", "observer", "constants", "residuals", "predictions"];
+/// the posterior; then what the coordinator does alone.
+pub const LAST: [&str; 6] = ["final run", "observer", "constants", "residuals", "predictions", FILES];
+
+/// How far a stage of a run is, in a few words.
+pub fn says(stage: &str, step: usize, steps: usize) -> String {
+    match stage {
+        FILES => String::new(),
+        _ if LAST.contains(&stage) => format!("{step} of {steps} ensembles after the fit"),
+        _ => format!("{step} of {steps} analyses"),
+    }
+}
+
+/// After all runs: the summary and the files.
+pub const FILES: &str = "files";
 
 impl Progress {
-    /// Whether it tells of an analysis, and not of the runs after the last one.
+    /// Whether it tells of an analysis, and not of the beginning of a pass or what comes after the last one.
     pub fn is_analysis(&self) -> bool {
-        !LAST.contains(&self.stage)
+        self.step > 0 && !self.is_after_fit()
+    }
+
+    /// Whether the fit is over.
+    pub fn is_after_fit(&self) -> bool {
+        LAST.contains(&self.stage)
+    }
+
+    /// How far its stage is, in a few words.
+    pub fn says(&self) -> String {
+        says(self.stage, self.step, self.steps)
     }
 
     /// Keeps it in the store, for those who look at the run from outside.

@@ -23,7 +23,7 @@ use crate::progress::{LAST, Progress};
 use crate::store::folder::{GIVEN_RESIDUALS, OBSERVER, PREDICTION_SD, RunFolder};
 use crate::store::json::json;
 use crate::store::snapshot::{Counts, Snapshot};
-use crate::work::WorkPlan;
+use crate::work::plan::WorkPlan;
 
 /// What a fit leaves behind.
 #[derive(Clone, Debug)]
@@ -51,7 +51,7 @@ pub struct Fit {
     /// Entries that stand for the last value of a state that walks, with the value at which runs from the start begin.
     pub(crate) starts: Vec<(usize, f64)>,
     /// What was planned, and how much of it the fit was.
-    pub(crate) work: (WorkPlan, f64),
+    pub(crate) work: (WorkPlan, [f64; 2]),
 }
 
 impl Fit {
@@ -119,6 +119,11 @@ impl RunContext<'_> {
         Ok(())
     }
 
+    /// Reports where a pass or a fit begins or goes on, between two analyses.
+    pub(super) fn stands(&mut self, progress: &Progress) {
+        (self.watch)(progress);
+    }
+
     /// The fit is over, after so many runs in all, and the runs of a place of [`LAST`] begin.
     fn goes_on(&mut self, store: &Store, fit: &Fit, place: usize, runs: u64, runner: &EnsembleRunner<'_>) {
         let (plan, done) = &fit.work;
@@ -127,7 +132,7 @@ impl RunContext<'_> {
             pass: fit.passes,
             passes: Some(fit.passes),
             step: place,
-            steps: LAST.len(),
+            steps: LAST.len() - 1,
             runs,
             workers: runner.n_workers(),
             work: plan.after(*done, place),
@@ -265,6 +270,7 @@ fn after_fit(
         context.goes_on(store, fit, 4, runs(runner), runner);
         predicted = predicted::predict(runner, &beside.given.widened(&fit.posterior))?;
     }
+    context.goes_on(store, fit, LAST.len() - 1, runs(runner), runner);
     Ok(AfterFit { predictions, predicted, observer, hangs_on, beside })
 }
 

@@ -17,6 +17,7 @@ use crate::judge::contribution::SECOND_SHARE;
 use crate::judge::effective_noise::inflation;
 use crate::judge::search_result::SearchResult;
 use crate::judge::verdict::ALIKE;
+use crate::run_cache::Course;
 use crate::screen::screening_result::ScreeningResult;
 
 /// Pairs that begin a refit.
@@ -56,6 +57,7 @@ struct PairScore {
 impl<'c> Searcher<'_, '_, 'c> {
     /// Refits the best pairs at the model as it is, where nothing else explains the gap.
     pub(super) fn refit_pairs(&mut self, found: &mut SearchResult<'c>) -> Result<(), ExplainError> {
+        self.cache.foreseen.goes(Course::Open);
         let members = self.members(found)?;
         let optimum = found.base.optimum()?;
         let threshold = found.null_distribution.threshold;

@@ -23,7 +23,7 @@ use crate::judge::search_result::SearchResult;
 use crate::judge::verdict::{Verdict, decide};
 use crate::locate::Track;
 use crate::options::Options;
-use crate::run_cache::RunCache;
+use crate::run_cache::{Course, RunCache};
 use crate::screen::screening::screen;
 use crate::screen::screening_result::ScreeningResult;
 
@@ -65,6 +65,7 @@ pub(crate) fn search<'c>(
     let before = Misfit::of(searcher.cache, &base);
     let adequacy = Adequacy::of(searcher.cache, &base);
     let held_out = held_out(searcher.cache, &base, &base);
+    searcher.cache.foreseen.goes(Course::Screen);
     searcher.cache.stage("screen", &format!("{} candidates", candidates.len()));
     let screening = searcher.screen_all(&base)?;
     let null_distribution = null_distribution(searcher.cache, &base, &screening, candidates)?;
@@ -84,7 +85,9 @@ pub(crate) fn search<'c>(
     };
     if adequacy.is_gap() || largest_gain > found.null_distribution.threshold {
         let best = searcher.best_of_each(&found.screening);
+        searcher.cache.foreseen.goes(Course::Refit);
         searcher.refit_singles(&mut found, &best)?;
+        searcher.cache.foreseen.goes(Course::Open);
         searcher.replace_terms(&mut found)?;
         searcher.second_pass(&mut found, options)?;
         // What passes the gates may yet be refused, and stand before a pair that would not be.
@@ -116,6 +119,7 @@ pub(crate) fn search_further<'c>(
         return Ok(false);
     };
     let mut searcher = Searcher { cache, candidates, tracks, cut_short: false, asked: false, tried };
+    searcher.cache.foreseen.goes(Course::Open);
     searcher.cache.stage("screen", &format!("{}, since no other effect explains the gap", kind.plural()));
     let screening = searcher.screen_all(&found.base)?;
     let best = searcher.best_of_each(&screening);

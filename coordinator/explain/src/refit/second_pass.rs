@@ -15,6 +15,7 @@ use crate::judge::form::{Leftover, Measured, leftover};
 use crate::judge::gates::JudgedFit;
 use crate::judge::search_result::SearchResult;
 use crate::options::Options;
+use crate::run_cache::Course;
 use crate::screen::screening::screen;
 use crate::screen::screening_result::ScreeningResult;
 
@@ -26,11 +27,12 @@ impl<'c> Searcher<'_, '_, 'c> {
         found: &mut SearchResult<'c>,
         options: &Options,
     ) -> Result<(), ExplainError> {
-        for _ in 1..=options.max_effects {
+        for pass in 1..=options.max_effects {
             if found.judged.first().is_none_or(|j| j.refusal.is_some()) {
                 return Ok(());
             }
-            let screening = self.rescreen(found, 0)?;
+            let course = if pass < options.max_effects { Course::Again } else { Course::Last };
+            let screening = self.rescreen(found, 0, course)?;
             let best = &found.judged[0];
             let name = best.fit.variant.name();
             let seconds: Vec<ScreeningResult> = self
@@ -54,7 +56,7 @@ impl<'c> Searcher<'_, '_, 'c> {
         if let Some(chosen) = (!passing.is_empty()).then(|| check_contributions(found, &passing).checked)
             && found.judged[chosen].leftover.is_none()
         {
-            self.rescreen(found, chosen)?;
+            self.rescreen(found, chosen, Course::Last)?;
         }
         Ok(())
     }
@@ -65,11 +67,16 @@ impl<'c> Searcher<'_, '_, 'c> {
         &mut self,
         found: &mut SearchResult<'c>,
         place: usize,
+        course: fn(usize) -> Course,
     ) -> Result<Vec<ScreeningResult>, ExplainError> {
         let judged = &found.judged[place];
+        let points = self.best_points(&found.screening);
+        let forms = modulated_forms(judged, self.tracks, span(self.cache.study));
+        let constants = constants(judged);
+        self.cache.foreseen.goes(course(points.len() + forms.len() + constants.len()));
         self.cache.stage("screen", &format!("again, with {}", judged.fit.variant.name()));
-        let screening = self.screen(&judged.fit, &self.best_points(&found.screening))?;
-        let left = self.measure_leftover(judged, &screening)?;
+        let screening = self.screen(&judged.fit, &points)?;
+        let left = self.measure_leftover(judged, &screening, [forms, constants])?;
         let variant = |j: &JudgedFit<'_>| (j.fit.variant.name(), j.fit.variant.left_out.clone());
         let of_place = variant(judged);
         if let Some(first) = found.judged.iter_mut().find(|j| variant(j) == of_place) {
@@ -83,9 +90,9 @@ impl<'c> Searcher<'_, '_, 'c> {
         &mut self,
         best: &JudgedFit<'c>,
         library: &[ScreeningResult],
+        [forms, constants]: [Vec<Candidate>; 2],
     ) -> Result<Leftover, ExplainError> {
-        let forms = modulated_forms(best, self.tracks, span(self.cache.study));
-        let (modulated, constants) = (self.measure(best, forms)?, self.measure(best, constants(best))?);
+        let (modulated, constants) = (self.measure(best, forms)?, self.measure(best, constants)?);
         let measured = Measured { library, modulated: &modulated, constants: &constants };
         leftover(self.cache, &best.fit, &measured)
     }
@@ -137,6 +144,7 @@ impl<'c> Searcher<'_, '_, 'c> {
                 fits.push(self.with_candidate(&best.fit, second)?);
             }
         }
+        self.cache.foreseen.goes(Course::Beside(fits.len()));
         self.cache.stage("refit", &format!("{} replacements and pairs", fits.len()));
         self.refit(fits)
     }

@@ -1,8 +1,12 @@
-//! How many points an explanation still runs, as far as that can be foreseen: for whoever waits; nothing that is found depends on it.
+//! How much an explanation still does, as far as that can be foreseen: for whoever waits; nothing that is found depends on it.
 //!
-//! What a fit takes is learned from the fits so far, what a screening takes from the candidates. Next file to read: [`super::batches`].
+//! A search is open: what does not pass the gates is followed by pairs, by terms of other kinds, by all of it once more. Its end is told from
+//! where something passed them on; what remains then is to score the candidates again, to refit what they add, and the verdict. Next file
+//! to read: [`super::batches`].
 
-use starlings_study::{Study, Work};
+use starlings_study::{Part, Study, Takes, Work};
+
+use crate::locate::MOST_RUNS;
 
 /// Iterations that are expected of the fit of the model as it is.
 const ITERATIONS: f64 = 5.0;
@@ -11,72 +15,121 @@ const CANDIDATES: f64 = 40.0;
 const GRID: f64 = 2.0;
 /// Points of a screening that are run once more with another amplitude, as a share.
 const AGAIN: f64 = 0.3;
-/// Fits that are driven at a time after a screening, and the iterations of each.
-const REFITS: f64 = 6.0;
-const OF_REFIT: f64 = 4.0;
-/// Forms of what was named that are tried beside the candidates.
-const FORMS: f64 = 10.0;
+/// Fits that are driven at a time after a screening, those that only begin to among them, and the iterations of each.
+const REFITS: f64 = 4.0;
+const OF_REFIT: f64 = 3.0;
+/// Of two second passes one ends without fits.
+const HALF: f64 = 0.5;
+
+/// What a run over windows takes beside one of a whole record, until one was made: the inverse of what a run plans with.
+const WINDOWED: f64 = 2.5;
+/// What the verdict and the files take of the coordinator, s: by compared value, and of every explanation, in the examples (the table of
+/// docs/watching.md).
+const VERDICT_VALUE_S: f64 = 1e-4;
+const FILES_S: f64 = 0.1;
 
 /// Runs of the search of a recording without a gap, as a share of those of the measured one: nothing is refitted.
 const OF_NULL: f64 = 0.5;
 
-/// A part of an explanation, in their order.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Part {
+/// Kinds of work, by their places.
+const FIT: usize = 0;
+const SCREEN: usize = 1;
+const REFIT: usize = 2;
+const OTHER: usize = 3;
+const VERDICT: usize = 4;
+const FILES: usize = 5;
+const NULLS: usize = 6;
+
+/// Where a search stands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Course {
     /// The fit of the model as it is.
     Fit,
     /// The first screening.
     Screen,
-    /// The refits of the best candidates.
+    /// The race and the refits of the best candidates.
     Refit,
-    /// What is screened and refitted beside the best.
-    Second,
-    /// What is left: the verdict, the figures.
-    Rest,
+    /// So many candidates and forms are scored at the best of those that passed the gates.
+    Again(usize),
+    /// So many of them are refitted beside it or in its place.
+    Beside(usize),
+    /// So many are scored for the last time.
+    Last(usize),
+    /// Something else is tried, of which nobody knows how long it takes.
+    Open,
+    /// Nothing more is searched.
+    Over,
 }
 
-/// What is foreseen, in runs.
+/// What is foreseen.
 #[derive(Clone, Debug)]
 pub(crate) struct Foreseen {
-    part: Part,
-    /// Runs at the beginning of the part.
-    before: f64,
+    course: Course,
+    /// Units that are done, by kinds of work, and those at the beginning of the course.
+    done: [f64; 7],
+    before: [f64; 7],
+    /// The kind that is being done.
+    at: usize,
     /// Runs of one point: the records.
     records: f64,
     /// Entries that a Jacobian moves.
     moved: f64,
     /// Candidates and points of their grids.
     candidates: [f64; 2],
+    /// Values that are compared.
+    values: f64,
     /// Simulated recordings that are searched afterwards.
     nulls: f64,
 }
 
 impl Foreseen {
-    pub(super) fn new(study: &Study) -> Self {
+    pub(super) fn new(study: &Study, values: usize) -> Self {
         Self {
-            part: Part::Fit,
-            before: 0.0,
+            course: Course::Fit,
+            done: [0.0; 7],
+            before: [0.0; 7],
+            at: FIT,
             records: study.records.len() as f64,
             moved: study.parameters.len() as f64,
             candidates: [CANDIDATES, GRID * CANDIDATES],
+            values: values as f64,
             nulls: 0.0,
         }
     }
 
-    /// A stage of this name begins after so many runs: a fit begins all anew, in units of another noise.
-    pub(super) fn stage(&mut self, name: &str, runs: u64) {
-        let part = match name {
-            "fit" => Part::Fit,
-            "screen" if self.part < Part::Screen => Part::Screen,
-            "refit" if self.part < Part::Refit => Part::Refit,
-            // Terms of further kinds are tried after a verdict.
-            "screen" if matches!(self.part, Part::Refit | Part::Rest) => Part::Second,
-            "verdict" | "add" | "show" => Part::Rest,
-            _ => return,
-        };
-        if part != self.part || part == Part::Fit {
-            (self.part, self.before) = (part, runs as f64);
+    /// A stage of this name begins. What the coordinator did alone until then is done.
+    pub(super) fn stage(&mut self, name: &str) {
+        if matches!(self.at, VERDICT | FILES) {
+            self.done[self.at] += 1.0;
         }
+        self.at = match name {
+            "fit" => FIT,
+            "screen" => SCREEN,
+            "refit" | "gates" => REFIT,
+            "verdict" => VERDICT,
+            "show" => FILES,
+            _ => OTHER,
+        };
+        match name {
+            "fit" => self.goes(Course::Fit),
+            "show" => self.goes(Course::Over),
+            "verdict" => self.goes(match self.course {
+                // Where nothing passed the gates something else may be tried after it.
+                Course::Refit | Course::Open => Course::Open,
+                _ => Course::Over,
+            }),
+            _ => {}
+        }
+    }
+
+    /// The search takes this course from here.
+    pub(crate) fn goes(&mut self, course: Course) {
+        (self.course, self.before) = (course, self.done);
+    }
+
+    /// So many runs are counted.
+    pub(super) fn count(&mut self, runs: u64) {
+        self.done[self.at] += runs as f64;
     }
 
     /// What is known of the candidates: how many, and how many points their grids have.
@@ -89,36 +142,85 @@ impl Foreseen {
         self.nulls = n as f64;
     }
 
-    /// Runs that the search of a simulated recording takes, by those of the measured one.
-    pub(crate) fn of_null(runs: f64) -> f64 {
-        OF_NULL * runs
+    /// The work now, with as many runs `next`, which are counted already.
+    pub(super) fn work(&self, next: usize) -> Work {
+        let next = next as f64;
+        let mut done = self.done;
+        done[self.at] = (done[self.at] - next).max(0.0);
+        let here = self.of(self.course);
+        let mut left = [0.0; 7];
+        for kind in [FIT, SCREEN, REFIT] {
+            left[kind] = (here[kind] - (done[kind] - self.before[kind])).max(0.0);
+        }
+        for (course, share) in self.later() {
+            left.iter_mut().zip(self.of(course)).for_each(|(left, of)| *left += share * of);
+        }
+        left[OTHER] = (MOST_RUNS as f64 - done[OTHER]).max(0.0);
+        for kind in [VERDICT, FILES] {
+            left[kind] = if done[kind] > 0.0 { 0.0 } else { 1.0 };
+        }
+        if self.at == FILES {
+            left = [0.0; 7];
+            left[FILES] = 1.0;
+        }
+        left[self.at] = left[self.at].max(next);
+        let search: f64 = done.iter().zip(&left).take(OTHER).map(|(done, left)| done + left).sum();
+        left[NULLS] = self.nulls * OF_NULL * search;
+        let is_open = matches!(self.course, Course::Fit | Course::Screen | Course::Refit | Course::Open);
+        let parts = self.parts(done, left);
+        Work { parts, at: self.at, next, ends: self.nulls <= 0.0 && !is_open }
     }
 
-    /// The work after so many runs, with as many `next`.
-    pub(super) fn work(&self, runs: u64, next: usize) -> Work {
-        let done = runs as f64;
-        let here = (self.before + self.runs_of(self.part)).max(done + next as f64);
-        let later: f64 = [Part::Fit, Part::Screen, Part::Refit, Part::Second, Part::Rest]
-            .into_iter()
-            .filter(|p| *p > self.part)
-            .map(|p| self.runs_of(p))
-            .sum();
-        let search = here + later;
-        Work { done, next: next as f64, total: search + self.nulls * Self::of_null(search) }
+    /// The work before the search of simulated recording `k`, from 0, after so many runs of those before.
+    pub(crate) fn null(&self, k: usize, runs: u64) -> Work {
+        let (mut done, mut left) = (self.done, [0.0; 7]);
+        let search: f64 = done.iter().take(OTHER).sum();
+        let each = if k > 0 { runs as f64 / k as f64 } else { OF_NULL * search };
+        done[FILES] = 1.0;
+        (done[NULLS], left[NULLS]) = (runs as f64, each * (self.nulls - k as f64).max(0.0));
+        Work { parts: self.parts(done, left), at: NULLS, next: 0.0, ends: k > 0 }
     }
 
-    /// Runs of a part.
-    fn runs_of(&self, part: Part) -> f64 {
-        let [n, n_point] = self.candidates;
+    fn parts(&self, done: [f64; 7], left: [f64; 7]) -> Vec<Part> {
+        let takes = |kind| match kind {
+            OTHER => Takes::Runs(WINDOWED),
+            VERDICT => Takes::Seconds(VERDICT_VALUE_S * self.values),
+            FILES => Takes::Seconds(FILES_S),
+            _ => Takes::Runs(1.0),
+        };
+        (0..done.len()).map(|kind| Part { takes: takes(kind), done: done[kind], left: left[kind] }).collect()
+    }
+
+    /// What usually follows, and how often.
+    fn later(&self) -> Vec<(Course, f64)> {
+        let [n, _] = self.candidates;
+        let n = n as usize;
+        let again = [(Course::Again(n), 1.0)];
+        match self.course {
+            Course::Fit => [(Course::Screen, 1.0), (Course::Refit, 1.0)].into_iter().chain(again).collect(),
+            Course::Screen => [(Course::Refit, 1.0)].into_iter().chain(again).collect(),
+            Course::Refit => again.into(),
+            Course::Again(n) => vec![(Course::Beside(1), HALF), (Course::Last(n), HALF)],
+            Course::Beside(_) => vec![(Course::Last(n), 1.0)],
+            Course::Last(_) | Course::Open | Course::Over => Vec::new(),
+        }
+    }
+
+    /// Runs of a course by kinds of work.
+    fn of(&self, course: Course) -> [f64; 7] {
+        let [_, n_point] = self.candidates;
         let iteration = self.moved + 3.0;
-        self.records
-            * match part {
-                Part::Fit => ITERATIONS * iteration,
-                Part::Screen => n_point * (1.0 + AGAIN),
-                Part::Refit => REFITS * OF_REFIT * iteration,
-                Part::Second => n * (1.0 + AGAIN) + FORMS + 0.5 * REFITS * OF_REFIT * iteration,
-                Part::Rest => 4.0,
-            }
+        let (kind, points) = match course {
+            Course::Fit => (FIT, ITERATIONS * iteration),
+            Course::Screen => (SCREEN, n_point * (1.0 + AGAIN)),
+            Course::Refit => (REFIT, REFITS * OF_REFIT * iteration),
+            Course::Again(n) | Course::Last(n) => (SCREEN, n as f64 * (1.0 + AGAIN)),
+            Course::Beside(n) => (REFIT, n as f64 * OF_REFIT * iteration),
+            Course::Open | Course::Over => (OTHER, 0.0),
+        };
+        let mut runs = [0.0; 7];
+        runs[kind] = self.records * points;
+        runs
     }
 }
 
@@ -126,36 +228,85 @@ impl Foreseen {
 mod tests {
     use super::*;
 
-    fn foreseen() -> Foreseen {
-        let candidates = [30.0, 50.0];
-        Foreseen { part: Part::Fit, before: 0.0, records: 2.0, moved: 3.0, candidates, nulls: 0.0 }
+    fn foreseen(nulls: f64) -> Foreseen {
+        Foreseen {
+            course: Course::Fit,
+            done: [0.0; 7],
+            before: [0.0; 7],
+            at: FIT,
+            records: 2.0,
+            moved: 3.0,
+            candidates: [30.0, 50.0],
+            values: 1000.0,
+            nulls,
+        }
+    }
+
+    fn left(of: &Foreseen, kind: usize) -> f64 {
+        of.work(0).parts[kind].left
+    }
+
+    /// The search has screened its candidates, and scores them again with one that passed the gates.
+    fn again() -> Foreseen {
+        let mut of = foreseen(0.0);
+        of.count(60);
+        of.goes(Course::Screen);
+        of.stage("screen");
+        of.count(110);
+        of.goes(Course::Refit);
+        of.stage("refit");
+        of.count(200);
+        of.goes(Course::Again(30));
+        of.stage("screen");
+        of
     }
 
     #[test]
-    fn what_takes_longer_than_expected_moves_the_end_and_what_is_short_brings_it_nearer() {
-        let mut of = foreseen();
-        let first = of.work(0, 8).total;
-        assert!((of.work(10, 8).total - first).abs() < 1e-9, "as expected");
-        assert!((of.work(1000, 8).total - (1008.0 + first - 60.0)).abs() < 1e-9, "a fit of many iterations");
-        of.stage("screen", 20);
-        assert!((of.work(20, 0).total - (first - 40.0)).abs() < 1e-9, "a fit of two iterations");
-        // No gap: what would be refitted is not.
-        of.stage("verdict", 150);
-        assert!(of.work(150, 0).total < 160.0);
-        // Nothing explains it, and terms of another kind are tried.
-        of.stage("screen", 155);
-        assert!(of.work(155, 0).total > 200.0);
+    fn the_end_is_told_from_where_something_passed_the_gates() {
+        let mut of = foreseen(0.0);
+        assert!(!of.work(0).ends, "the fit");
+        of.goes(Course::Refit);
+        assert!(!of.work(0).ends, "refits, after which pairs may be tried");
+        of.stage("verdict");
+        assert!(!of.work(0).ends, "a verdict on what did not pass");
+        let mut of = again();
+        assert!(of.work(0).ends);
+        of.stage("verdict");
+        assert!(of.work(0).ends && left(&of, SCREEN).abs() < 1e-9, "what is not scored again is not left");
+        of.stage("fit");
+        assert!(!of.work(0).ends, "all of it in units of another noise");
     }
 
     #[test]
-    fn a_search_in_units_of_another_noise_is_all_of_it_again() {
-        let mut of = foreseen();
-        let first = of.work(0, 0).total;
-        of.stage("screen", 70);
-        of.stage("refit", 200);
-        of.stage("screen", 500);
-        of.stage("verdict", 700);
-        of.stage("fit", 702);
-        assert!((of.work(702, 0).total - (702.0 + first)).abs() < 1e-9);
+    fn what_is_scored_again_is_done_run_by_run() {
+        let mut of = again();
+        let all = left(&of, SCREEN);
+        // All of them now, and once more where something is refitted beside it.
+        assert!((all - 1.5 * 2.0 * 30.0 * 1.3).abs() < 1e-9, "{all}");
+        of.count(40);
+        assert!((left(&of, SCREEN) - (all - 40.0)).abs() < 1e-9);
+        let next = of.work(10);
+        assert!((next.parts[SCREEN].left - (all - 30.0)).abs() < 1e-9 && next.at == SCREEN, "{next:?}");
+        of.goes(Course::Last(30));
+        assert!((left(&of, SCREEN) - 2.0 * 30.0 * 1.3).abs() < 1e-9 && left(&of, REFIT).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_coordinators_own_work_is_left_until_its_stage_ends() {
+        let mut of = again();
+        of.stage("verdict");
+        assert!((left(&of, VERDICT) - 1.0).abs() < 1e-9);
+        of.stage("add");
+        assert!(left(&of, VERDICT).abs() < 1e-9 && (left(&of, FILES) - 1.0).abs() < 1e-9);
+        of.stage("show");
+        assert!((left(&of, FILES) - 1.0).abs() < 1e-9 && left(&of, OTHER).abs() < 1e-9);
+    }
+
+    #[test]
+    fn recordings_without_a_gap_are_foreseen_by_those_before() {
+        let of = foreseen(4.0);
+        assert!(!of.null(0, 0).ends, "no one was searched");
+        let after = of.null(1, 90);
+        assert!(after.ends && (after.parts[NULLS].left - 270.0).abs() < 1e-9, "{after:?}");
     }
 }

@@ -14,7 +14,8 @@ use super::runner::{AnalysisIndex, EnsembleRunner, Results, StepWindows};
 use super::stack::stack_outputs;
 use crate::store::snapshot::{Figures, Iteration, Snapshot};
 use crate::store::{AnalysisRow, Store};
-use crate::work::WorkPlan;
+use crate::work::plan::{self, WorkPlan};
+use crate::work::settling::{More, Settling};
 use crate::{Fit, Progress, RunContext, RunError, Study, posterior};
 
 /// Iterates to the posterior mode, continuing from `resumed` if there is one.
@@ -40,7 +41,8 @@ pub(crate) fn fit(
     };
     let values: Vec<f64> = windows.iter().flat_map(|(_, w)| w.observed.iter().copied()).collect();
     let noise = noise(study, &windows, 1.0);
-    let plan = WorkPlan::new(study, batch.set.n_particle());
+    let plan = WorkPlan::new(study, batch.set.n_particle() + 1);
+    let mut settling = Settling::default();
     let mut now = match resumed {
         Some(snapshot) => {
             runner.recall(snapshot.figures.failures.clone());
@@ -48,6 +50,9 @@ pub(crate) fn fit(
         }
         None => begin(&batch, study),
     };
+    if now.figures.step == 0 {
+        context.stands(&progress(&now, (&batch, &plan), More::Usual, runner));
+    }
     while !now.estimate.state.converged && now.figures.step < batch.max_iterations {
         let at = AnalysisIndex { pass: 1, step: now.figures.step };
         let theta = batch.sample(&now.estimate.state);
@@ -65,7 +70,9 @@ pub(crate) fn fit(
         let mut row = row(study, at, &step);
         row.jobs = runner.take_rows();
         store.analysis(&row, &now)?;
-        context.after_step(store, &progress(&now, (&batch, &plan), runner))?;
+        settling.step(step.step);
+        let more = if step.converged { More::Expected(0) } else { settling.more(batch.tolerance) };
+        context.after_step(store, &progress(&now, (&batch, &plan), more, runner))?;
     }
     if now.figures.n_used == 0 {
         return Err(EstimatorError::StartFailed { attempt: now.figures.step }.into());
@@ -163,7 +170,7 @@ fn row(study: &Study, at: AnalysisIndex, step: &BatchStep) -> AnalysisRow {
 }
 
 fn finish(now: Snapshot<Iteration>, plan: WorkPlan) -> Fit {
-    let done = plan.at(0, now.figures.step).done;
+    let done = plan::done(&plan.at(0, now.figures.step, More::Expected(0)));
     Fit {
         converged: now.estimate.state.converged,
         posterior: now.estimate.posterior,
@@ -183,6 +190,7 @@ fn finish(now: Snapshot<Iteration>, plan: WorkPlan) -> Fit {
 fn progress(
     now: &Snapshot<Iteration>,
     (batch, plan): (&Batch, &WorkPlan),
+    more: More,
     runner: &EnsembleRunner<'_>,
 ) -> Progress {
     Progress {
@@ -193,6 +201,6 @@ fn progress(
         steps: batch.max_iterations,
         runs: now.figures.counts.total,
         workers: runner.n_workers(),
-        work: plan.at(0, now.figures.step),
+        work: plan.at(0, now.figures.step, more),
     }
 }

@@ -15,7 +15,8 @@ use super::settle;
 use super::stack::{stack_outputs, stack_states};
 use crate::store::snapshot::{Ensemble, Snapshot};
 use crate::store::{AnalysisRow, InnovationRow, Store};
-use crate::{Fit, RunContext, RunError, Study, posterior};
+use crate::work::settling::{More, Settling};
+use crate::{Fit, Move, RunContext, RunError, Study, posterior};
 
 /// Runs every pass of the filter that `make` gives, continuing from `resumed` if there is one.
 ///
@@ -38,13 +39,24 @@ pub(crate) fn fit(
         None => schedule.start(0, &posterior::prior(study)),
     };
     let mut reported = schedule.reported(&now)?;
+    let mut settling = Settling::default();
+    // Passes after the one that goes on.
+    let mut later = More::Usual;
     loop {
+        if now.figures.step == 0 {
+            context.stands(&schedule.progress(&now, later, runner));
+        }
         while now.figures.step < schedule.n_step() {
             store.keep_inputs(&now)?;
             let (row, next) = step(runner, &schedule, &mut now, &reported)?;
             reported = next;
             store.analysis(&row, &now)?;
-            context.after_step(store, &schedule.progress(&now, runner))?;
+            let is_over = now.figures.step == schedule.n_step();
+            if let Some(moved) = schedule.last_move(&now, &reported).filter(|_| is_over) {
+                settling.step(moved.size);
+                later = settling.more(Move::SETTLED);
+            }
+            context.after_step(store, &schedule.progress(&now, later, runner))?;
         }
         let before_runs = runner.counts;
         let next = settle::next(runner, &schedule, &now, &reported)?;
@@ -55,6 +67,7 @@ pub(crate) fn fit(
         next.figures.dropped = now.figures.dropped;
         now = next;
         reported = schedule.reported(&now)?;
+        later = later.later();
     }
 }
 

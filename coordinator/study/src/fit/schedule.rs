@@ -18,7 +18,8 @@ use starlings_models::Window;
 use super::runner::{EnsembleRunner, StepWindows};
 use super::walking::Walking;
 use crate::store::snapshot::{Ensemble, Figures, Snapshot};
-use crate::work::WorkPlan;
+use crate::work::plan::{self, WorkPlan};
+use crate::work::settling::More;
 use crate::{Fit, Move, Progress, RunError, Study, ThetaEntry, posterior};
 
 /// Least width of the points in prior sd: closer, rounding inside the model would show.
@@ -170,7 +171,10 @@ impl<'a> Schedule<'a> {
         Fit {
             last_move: self.last_move(now, &reported),
             starts: self.walking.starts(&now.estimate.centre),
-            work: (self.work.clone(), self.work.at(now.figures.pass, now.figures.step).done),
+            work: (
+                self.work.clone(),
+                plan::done(&self.work.at(now.figures.pass, now.figures.step, More::Expected(0))),
+            ),
             posterior: reported.posterior,
             log_likelihood: reported.log_likelihood,
             nis: reported.nis,
@@ -183,7 +187,13 @@ impl<'a> Schedule<'a> {
         }
     }
 
-    pub(super) fn progress(&self, now: &Snapshot<Ensemble>, runner: &EnsembleRunner<'_>) -> Progress {
+    /// Where the fit stands, and the passes after this one.
+    pub(super) fn progress(
+        &self,
+        now: &Snapshot<Ensemble>,
+        more: More,
+        runner: &EnsembleRunner<'_>,
+    ) -> Progress {
         Progress {
             stage: "filter",
             pass: now.figures.pass + 1,
@@ -192,7 +202,7 @@ impl<'a> Schedule<'a> {
             steps: self.n_step(),
             runs: now.figures.counts.total,
             workers: runner.n_workers(),
-            work: self.work.at(now.figures.pass, now.figures.step),
+            work: self.work.at(now.figures.pass, now.figures.step, more),
         }
     }
 }

@@ -98,7 +98,7 @@ impl Ensemble {
         watch: &mut dyn FnMut(&Stage),
     ) -> Result<Forecast, StudyForecastError> {
         let n = self.members.len();
-        let work = Work { done: 0.0, next: n as f64, total: n as f64 };
+        let work = Work::of_runs(0.0, n as f64, n as f64);
         let says = format!("{n} members");
         watch(&Stage { name: "ensemble", says, runs: 0, workers: fleet.n_workers(), work });
         let members = Members::run(fleet, &self)?;
