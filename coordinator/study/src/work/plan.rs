@@ -19,7 +19,7 @@ const WHOLE: f64 = 0.4;
 /// Runs of a whole record between two passes that go on until the estimate has settled.
 const SEARCH: f64 = 2.0;
 /// What the coordinator does after the runs, s: the statistics of the residuals, the summary, the files; of every study, and for every value
-/// that is compared and every parameter, as it took in the coarctation and the plate (docs/watching.md).
+/// that is compared and every parameter, as it took in the coarctation and the plate in the development profile.
 const FILES_S: f64 = 0.03;
 const VALUE_S: f64 = 1e-5;
 
