@@ -2,7 +2,7 @@
 //! by, on pieces of the recording, beside the interval of that coefficient.
 //!
 //! The pieces have sums at h, 2h and 4h (`decimation.rs`); how well they know the move is told by the jackknife over them (Tukey, Annals of
-//! Mathematical Statistics 1958). Where 4h has no fit, h and 2h are compared, whose difference is at least three times the error at h, for
+//! Mathematical Statistics 1958). Where 4h has no fit, h and 2h are compared, whose difference is at most three times the error at h, for
 //! the error falls with the square of the step at most. Where 2h has none either, the fitted drift itself says how far it goes in a step: at
 //! mid-points a rate λ comes out as (2/h) tanh(λh/2), too small by (λh)²/12 of itself. Read next: `decimation.rs`, which takes the error out.
 
