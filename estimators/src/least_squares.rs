@@ -8,6 +8,7 @@
 mod damped;
 mod need;
 mod outcome;
+mod step;
 #[cfg(test)]
 mod tests;
 
@@ -19,8 +20,6 @@ use crate::block_angular::BlockAngular;
 
 /// Share of the cost that derivatives from differences of runs resolve.
 const RESOLUTION: f64 = 1e-8;
-/// Longest step of one component, in units of z.
-const LONGEST: f64 = 3.0;
 
 /// A fit under way.
 #[derive(Debug, Clone)]
@@ -41,6 +40,10 @@ pub struct LeastSquares {
     radius: f64,
     /// ... and that of the last step.
     length: f64,
+    /// The last step, in the units of z where it began.
+    step: DVector<f64>,
+    /// Whether it was as long as the linear model would have it.
+    is_whole: bool,
     rejected: usize,
     predicted: f64,
     need: Need,
@@ -48,7 +51,8 @@ pub struct LeastSquares {
 
 impl LeastSquares {
     /// A fit from a point that was not run yet. It ends when no step promises a fall of the cost (chi-square plus prior) above
-    /// `tolerance` and what the digits of the cost resolve, or after `trials` steps.
+    /// `tolerance`, in units of the mean square of the residuals where that is above one, and what the digits of the cost resolve, or
+    /// after `trials` steps.
     pub fn new(start: DVector<f64>, prior: Scaled, tolerance: f64, trials: usize) -> Self {
         let need = Need::Residual(start.clone());
         Self {
@@ -64,6 +68,8 @@ impl LeastSquares {
             measured: None,
             radius: f64::INFINITY,
             length: 0.0,
+            step: DVector::zeros(0),
+            is_whole: true,
             rejected: 0,
             predicted: 0.0,
             need,
@@ -138,6 +144,14 @@ impl LeastSquares {
         RESOLUTION * self.cost
     }
 
+    /// The smallest fall of the cost that is worth a run: the tolerance in units of the noise that the residuals show, where that is more
+    /// than was stated. A step that was cut short promises less than there is to come, so that the tolerance holds as it stands.
+    fn smallest(&self) -> f64 {
+        let shown = self.cost / self.residual.len().max(1) as f64;
+        let unit = if self.is_whole { shown.max(1.0) } else { 1.0 };
+        (self.tolerance * unit).max(self.resolution())
+    }
+
     /// Steps that it may still try.
     pub fn trials_left(&self) -> usize {
         self.trials_left
@@ -163,14 +177,13 @@ impl LeastSquares {
             return;
         }
         self.trials_left = self.trials_left.saturating_sub(1);
-        let step = &trial - &self.z;
         let cost = residual.as_ref().map_or(f64::INFINITY, |e| self.cost_of(&trial, e));
         let was_fresh = self.fresh;
         let ratio = (self.cost - cost) / self.predicted.max(f64::MIN_POSITIVE);
         if let Some(new) = &residual {
             // Broyden's update: the change of the prediction is minus that of the residual.
-            let surprise = &self.residual - new - self.jacobian.times(&step);
-            self.jacobian.learn(&surprise, &step);
+            let surprise = &self.residual - new - self.jacobian.times(&self.step);
+            self.jacobian.learn(&surprise, &self.step);
         }
         if let Some(residual) = residual.filter(|_| cost < self.cost) {
             self.accept(trial, residual, cost, ratio, was_fresh);
@@ -196,11 +209,11 @@ impl LeastSquares {
 
     /// Chooses the next need from the linear model at the best point.
     fn plan(&mut self) {
-        let Some(step) = self.step() else {
+        let Some(step) = self.find_step() else {
             self.need = Need::Nothing(End::Stalled);
             return;
         };
-        if self.predicted <= self.tolerance.max(self.resolution()) {
+        if self.predicted <= self.smallest() {
             self.need = if self.fresh {
                 Need::Nothing(End::Converged)
             } else if self.thorough {
@@ -210,48 +223,11 @@ impl LeastSquares {
             };
             return;
         }
-        self.need = Need::Residual(&self.z + step);
-    }
-
-    /// The damped step within the bounds; notes the fall of the cost that it predicts. Components at a bound that pull outwards
-    /// are left where they are, and those that move no residual go to their prior mean last: a parameter inside a term whose
-    /// amplitude is still zero has its influence where the amplitude is not.
-    fn step(&mut self) -> Option<DVector<f64>> {
-        let (felt, smallest) = (self.jacobian.squares(), self.tolerance.max(self.resolution()));
-        let step = self.step_of(&felt, &|j| felt[j] > 0.0)?;
-        if self.thorough && self.predicted <= smallest && felt.iter().any(|square| *square <= 0.0) {
-            return self.step_of(&felt, &|_| true);
-        }
-        Some(step)
-    }
-
-    /// The step of the components that may move, whose columns have these squares.
-    fn step_of(&mut self, felt: &DVector<f64>, moves: &dyn Fn(usize) -> bool) -> Option<DVector<f64>> {
-        let p = self.z.len();
-        let precision = &self.prior.precision;
-        let pull = &self.prior.mean - &self.z;
-        let gradient = self.jacobian.tr_times(&self.residual) + precision.component_mul(&pull);
-        let curvature = felt + precision;
-        let held = |j: usize| {
-            let [lo, hi] = self.prior.bounds[j];
-            (self.z[j] <= lo && gradient[j] < 0.0) || (self.z[j] >= hi && gradient[j] > 0.0)
-        };
-        let free: Vec<usize> = (0..p).filter(|j| moves(*j) && !held(*j) && curvature[*j] > 0.0).collect();
-        let solved = damped::solve(self, &free, &pull, &curvature)?;
-        let shrink = (LONGEST / solved.amax().max(f64::MIN_POSITIVE)).min(1.0);
-        let mut step = DVector::zeros(p);
-        for (k, j) in free.iter().enumerate() {
-            let [lo, hi] = self.prior.bounds[*j];
-            step[*j] = (self.z[*j] + solved[k] * shrink).clamp(lo, hi) - self.z[*j];
-        }
-        self.length = curvature.component_mul(&step).dot(&step).sqrt();
-        let prior = precision.component_mul(&step).dot(&step);
-        self.predicted = 2.0 * gradient.dot(&step) - self.jacobian.times(&step).norm_squared() - prior;
-        Some(step)
+        self.need = Need::Residual(self.led(&step));
+        self.step = step;
     }
 
     fn cost_of(&self, z: &DVector<f64>, residual: &DVector<f64>) -> f64 {
-        let pull = z - &self.prior.mean;
-        residual.norm_squared() + pull.component_mul(&pull).dot(&self.prior.precision)
+        residual.norm_squared() + self.prior.cost(z)
     }
 }

@@ -43,6 +43,7 @@ impl<'a> Hypothesis<'a> {
             mean: DVector::zeros(p),
             precision: DVector::from_element(p, 1.0),
             bounds: vec![[f64::NEG_INFINITY, f64::INFINITY]; p],
+            growth: DVector::zeros(p),
         };
         let solver = LeastSquares::new(start, prior, TOLERANCE, TRIALS);
         let jacobian = DMatrix::zeros(0, p);

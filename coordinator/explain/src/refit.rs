@@ -1,6 +1,6 @@
 //! The search: refits of the best candidates, then a second pass from the best of them with replacements and pairs.
 //!
-//! Files: [`search`], [`race`], [`ranking`], [`pairs`] and [`finite`] where no effect explains the gap alone, [`second_pass`], and
+//! Files: [`search`], [`race`], [`ranking`], [`replacements`] of terms, [`pairs`] and [`finite`] where no effect explains the gap alone, [`second_pass`], and
 //! [`modulated_forms`], whose effects ask whether the form of an effect is right.
 
 mod finite;
@@ -8,5 +8,6 @@ mod modulated_forms;
 mod pairs;
 mod race;
 mod ranking;
+mod replacements;
 pub(crate) mod search;
 mod second_pass;

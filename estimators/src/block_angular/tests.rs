@@ -213,7 +213,8 @@ fn a_fit_in_blocks_ends_where_the_dense_fit_ends() {
     };
     let run = |of: &dyn Fn(BlockAngular) -> BlockAngular| {
         let bounds = vec![[f64::NEG_INFINITY, f64::INFINITY]; 1 + K];
-        let prior = Scaled { mean: DVector::zeros(1 + K), precision: DVector::zeros(1 + K), bounds };
+        let none = DVector::zeros(1 + K);
+        let prior = Scaled { mean: none.clone(), precision: none.clone(), bounds, growth: none };
         let mut fit = LeastSquares::new(DVector::from_element(1 + K, 1.0), prior, 1e-6, 50);
         let mut runs = 0;
         loop {

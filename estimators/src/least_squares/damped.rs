@@ -13,18 +13,19 @@ const LEAST_DAMPING: f64 = 1e-12;
 /// ... and the largest, with which next to nothing is left of one.
 const MOST_DAMPING: f64 = 1e8;
 /// A step within the region of trust uses so much of its radius.
-const USED: f64 = 0.8;
+pub(super) const USED: f64 = 0.8;
 /// Halvings of the interval of the damping, in its logarithm, at most.
 const HALVINGS: usize = 24;
 
-/// The step of the free components within the region of trust; `pull` is prior mean minus z, `curvature` the diagonal of J^T J + P,
-/// both of length p. `None` when it is not finite.
+/// The step of the free components within the region of trust, for what is `left` of the residual (m); `pull` is prior mean minus z,
+/// `curvature` the diagonal of J^T J + P, both of length p. `None` when it is not finite.
 ///
 /// The damping is what makes the step as long as the radius allows (Moré 1978), however small it must be: in a narrow valley a damping of
 /// a fixed share of the curvature forbids every step along it.
 pub(super) fn solve(
     fit: &LeastSquares,
     free: &[usize],
+    left: &DVector<f64>,
     pull: &DVector<f64>,
     curvature: &DVector<f64>,
 ) -> Option<DVector<f64>> {
@@ -33,13 +34,13 @@ pub(super) fn solve(
         squares.sum::<f64>().sqrt() / fit.radius
     };
     let [mut lo, mut hi] = [LEAST_DAMPING.ln(), MOST_DAMPING.ln()];
-    let mut step = damped(fit, free, pull, curvature, LEAST_DAMPING)?;
+    let mut step = damped(fit, free, left, pull, curvature, LEAST_DAMPING)?;
     if of_radius(&step) <= 1.0 {
         return Some(step);
     }
     for _ in 0..HALVINGS {
         let middle = 0.5 * (lo + hi);
-        step = damped(fit, free, pull, curvature, middle.exp())?;
+        step = damped(fit, free, left, pull, curvature, middle.exp())?;
         match of_radius(&step) {
             used if used > 1.0 => lo = middle,
             used if used >= USED => break,
@@ -53,6 +54,7 @@ pub(super) fn solve(
 fn damped(
     fit: &LeastSquares,
     free: &[usize],
+    left: &DVector<f64>,
     pull: &DVector<f64>,
     curvature: &DVector<f64>,
     damping: f64,
@@ -61,6 +63,6 @@ fn damped(
     let prior = Diagonal { right: root.component_mul(pull), entries: root };
     let damping = curvature.map(|c| (c * damping).sqrt());
     let damping = Diagonal { entries: damping, right: DVector::zeros(pull.len()) };
-    let solved = fit.jacobian.least_squares(free, &fit.residual, &[prior, damping])?;
+    let solved = fit.jacobian.least_squares(free, left, &[prior, damping])?;
     Some(solved.select_rows(free))
 }

@@ -13,6 +13,17 @@ pub struct Scaled {
     pub precision: DVector<f64>,
     /// Smallest and largest value of each, length p.
     pub bounds: Vec<[f64; 2]>,
+    /// For a component that is the logarithm of a quantity to which the rates are proportional: the growth of its logarithm per unit of
+    /// z, above zero. Zero for all others. Length p.
+    pub growth: DVector<f64>,
+}
+
+impl Scaled {
+    /// Twice the negative logarithm of the density at z, up to a constant.
+    pub(super) fn cost(&self, z: &DVector<f64>) -> f64 {
+        let pull = z - &self.mean;
+        pull.component_mul(&pull).dot(&self.precision)
+    }
 }
 
 /// The run, or runs, that a fit needs next.

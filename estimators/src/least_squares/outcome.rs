@@ -24,6 +24,7 @@ impl LeastSquares {
         ratio: f64,
         was_fresh: bool,
     ) {
+        self.carry_jacobian();
         self.z = z;
         self.residual = e;
         self.cost = cost;
@@ -71,7 +72,7 @@ impl LeastSquares {
     fn give_up(&mut self, was_fresh: bool) {
         let of_here = self.restore() || was_fresh;
         self.radius = f64::INFINITY;
-        let _ = self.step();
+        let _ = self.find_step();
         self.need = Need::Nothing(if of_here { End::Stalled } else { End::Tentative });
     }
 

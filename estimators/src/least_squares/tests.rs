@@ -1,5 +1,7 @@
 //! Small problems with known solutions.
 
+mod of_step;
+
 use nalgebra::DMatrix;
 
 use super::*;
@@ -22,7 +24,8 @@ fn jacobian(z: &DVector<f64>) -> DMatrix<f64> {
 
 fn flat(p: usize) -> Scaled {
     let bounds = vec![[f64::NEG_INFINITY, f64::INFINITY]; p];
-    Scaled { mean: DVector::zeros(p), precision: DVector::zeros(p), bounds }
+    let none = DVector::zeros(p);
+    Scaled { mean: none.clone(), precision: none.clone(), bounds, growth: none }
 }
 
 fn drive(fit: &mut LeastSquares) -> (End, usize, usize) {

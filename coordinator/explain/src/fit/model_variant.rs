@@ -6,7 +6,7 @@
 //! amplitudes in a unit of their size without prior. Next file to read: [`super::drive`].
 
 use nalgebra::DVector;
-use starlings_estimators::Scaled;
+use starlings_estimators::{Scaled, Transform};
 use starlings_models::SetupError;
 use starlings_study::Study;
 
@@ -21,6 +21,26 @@ pub(crate) struct AddedEffect<'c> {
     pub index: usize,
     /// Size of its amplitude, in the amplitude's unit, above zero.
     pub unit: f64,
+}
+
+/// Growth of the logarithm of every entry per unit of its z, where the rates of the equations are linear in the parameter and z is its
+/// logarithm; zero for all others, and for parameters of effects.
+fn growth(base: &Study, study: &Study, n_own: usize) -> DVector<f64> {
+    let mut growth = DVector::zeros(study.theta.len());
+    let Some(equations) = &base.setup.model.equations else { return growth };
+    let per_unit = |transform: Transform| match transform {
+        Transform::Log => 1.0,
+        Transform::Log2 => std::f64::consts::LN_2,
+        Transform::Linear | Transform::Logit { .. } => 0.0,
+    };
+    let names: Vec<&str> = study.parameters.iter().map(|parameter| parameter.name.as_str()).collect();
+    let linear = equations.linear_in(&names);
+    for (growth, entry) in growth.iter_mut().zip(&study.theta[..n_own]) {
+        if linear.contains(&names[entry.parameter]) {
+            *growth = per_unit(entry.transform) * entry.prior_sd;
+        }
+    }
+    growth
 }
 
 /// The study's model with effects added and terms left out.
@@ -69,7 +89,8 @@ impl<'c> ModelVariant<'c> {
             bounds[at] = effect.candidate.def.parameters[0].range.map(|v| v / effect.unit);
             at += effect.candidate.def.parameters.len();
         }
-        let scaled = Scaled { mean: DVector::zeros(n), precision, bounds };
+        let growth = growth(base, &study, n_own);
+        let scaled = Scaled { mean: DVector::zeros(n), precision, bounds, growth };
         Ok(Self { base, study, effects, left_out: left_out.to_vec(), n_own, centre, unit, scaled })
     }
 

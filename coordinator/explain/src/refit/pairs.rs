@@ -91,7 +91,10 @@ impl<'c> Searcher<'_, '_, 'c> {
 
     /// Those of these fits that promise most after their first rounds. Without a run, for it failed or the budget ended before it, there
     /// is nothing to judge.
-    fn first_of(&mut self, mut fits: Vec<FittedVariant<'c>>) -> Result<Vec<FittedVariant<'c>>, ExplainError> {
+    pub(super) fn first_of(
+        &mut self,
+        mut fits: Vec<FittedVariant<'c>>,
+    ) -> Result<Vec<FittedVariant<'c>>, ExplainError> {
         self.cut_short |= !drive_rounds(self.cache, &mut fits, ROUNDS)?;
         fits.retain(|fit| !fit.residual().is_empty());
         fits.sort_by(|a, b| a.promised().total_cmp(&b.promised()));

@@ -260,29 +260,4 @@ impl<'c> Searcher<'_, '_, 'c> {
         found.judged.sort_by(order);
         Ok(())
     }
-
-    /// Leaves out every replaceable term in turn and searches for an effect in its place.
-    fn replace_terms(&mut self, found: &mut SearchResult<'c>) -> Result<(), ExplainError> {
-        let equations = self.cache.study.setup.model.equations.as_ref();
-        let terms: Vec<String> = equations.map(|e| e.replaceable.clone()).unwrap_or_default();
-        for term in terms {
-            let variant = ModelVariant::new(found.base.variant.base, Vec::new(), &[term])?;
-            let start = variant.continue_from(&found.base.variant, found.base.z(), &[]);
-            let mut without = vec![FittedVariant::begin(variant, start)];
-            self.cache.stage("refit", "the model without a replaceable term");
-            if !drive(self.cache, &mut without)? {
-                self.cut_short = true;
-                return Ok(());
-            }
-            let without = without.swap_remove(0);
-            if !without.is_fresh() {
-                continue;
-            }
-            let screening = self.screen_all(&without)?;
-            let best = self.best_of_each(&screening);
-            let fits = self.race_and_refit(&without, &best, &screening)?;
-            self.judge_all(found, fits)?;
-        }
-        Ok(())
-    }
 }

@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use super::expression::Expression;
 use crate::{Role, SetupError, nearest};
 
 /// The equations of a model, as a study states them.
@@ -52,6 +53,23 @@ impl EquationsDef {
             }
         }
         Ok(def)
+    }
+
+    /// The parameters among these names to which the rates are proportional, up to terms without them, and which nothing else has: what
+    /// the model does changes with such a parameter itself more evenly than with its logarithm.
+    pub fn linear_in<'n>(&self, names: &[&'n str]) -> Vec<&'n str> {
+        let parsed = |text: &String| Expression::parse(text).ok();
+        let has = |e: &Expression, name: &str| e.names().iter().any(|(known, _)| known == name);
+        let elsewhere = self.states.iter().map(|state| &state.initial);
+        let elsewhere = elsewhere.chain(self.outputs.iter().map(|output| &output.value));
+        let elsewhere: Vec<Expression> = elsewhere.filter_map(parsed).collect();
+        let rates = self.states.iter().flat_map(|state| state.rate.iter().map(|(_, text)| text));
+        let rates: Vec<Expression> = rates.filter_map(parsed).collect();
+        let is_linear = |name: &&&str| {
+            let mut of = rates.iter().filter(|e| has(e, name)).peekable();
+            of.peek().is_some() && of.all(|e| e.is_linear_in(name)) && !elsewhere.iter().any(|e| has(e, name))
+        };
+        names.iter().filter(is_linear).copied().collect()
     }
 }
 
@@ -178,5 +196,25 @@ pub struct SolverDef {
 impl Default for SolverDef {
     fn default() -> Self {
         Self { method: Method::Auto, rtol: 1e-8, atol: 1e-10, step: None }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rates_are_linear_in_what_is_a_factor_of_their_terms_and_stands_nowhere_else() {
+        let state = |name: &str, initial: &str, rate: &str| StateDef {
+            name: name.to_owned(),
+            initial: initial.to_owned(),
+            rate: vec![(name.to_owned(), rate.to_owned())],
+            ..StateDef::default()
+        };
+        let states = vec![state("x", "x0", "v"), state("v", "0", "-k*x - c*abs(v)*v/m - x^n + g*s")];
+        let outputs =
+            vec![OutputDef { name: "y".to_owned(), value: "s*x".to_owned(), ..OutputDef::default() }];
+        let def = EquationsDef { states, outputs, ..EquationsDef::default() };
+        assert_eq!(def.linear_in(&["k", "c", "m", "n", "g", "s", "x0", "absent"]), ["k", "c", "g"]);
     }
 }
