@@ -22,6 +22,7 @@ use crate::judge::search_result::SearchResult;
 use crate::judge::verdict::{Decision, Verdict, decide, limits};
 use crate::locate::{self, Track, UnknownInput};
 use crate::options::Options;
+use crate::refit::other_forms::{is_of_a_field, search_other_forms, sole_effect};
 use crate::refit::search::{first_kinds, search, search_further};
 use crate::run_cache::{Course, Point, RunCache};
 use crate::screen::candidates::candidates;
@@ -103,8 +104,8 @@ fn foresee(cache: &mut RunCache<'_>, candidates: &[Candidate], options: &Options
     cache.foreseen.candidates(tried().count(), tried().map(|c| c.points.len()).sum());
 }
 
-/// Decides, and goes on with generic terms and then with proposals while nothing explains the gap. `proposed` takes the candidates with the
-/// proposals, where any are made. With the decision come the unknown inputs of the model as it is.
+/// Decides, and goes on with generic terms and then with proposals while nothing explains the gap, or with other forms of what explains it.
+/// `proposed` takes the candidates with the proposals, where any are made. With the decision come the unknown inputs of the model as it is.
 fn decide_further<'c>(
     cache: &mut RunCache<'_>,
     found: &mut SearchResult<'c>,
@@ -132,6 +133,17 @@ fn decide_further<'c>(
             cache.stage("verdict", "");
             decision = decide(cache, found, all)?;
         }
+    } else if let Some(named) = decision.best
+        && proposals::are_wanted(found.base.variant.base, options)
+    {
+        let Proposals { candidates: made, considered } =
+            in_place_of(found, named, candidates, tracks, &forces);
+        found.looked_at = considered as f64 / made.len().max(1) as f64;
+        let all = proposed.get_or_init(|| candidates.iter().cloned().chain(made).collect());
+        if search_other_forms(cache, found, all, tracks, options, named)? {
+            cache.stage("verdict", "");
+            decision = decide(cache, found, all)?;
+        }
     }
     Ok((decision, forces))
 }
@@ -150,6 +162,32 @@ fn forces(cache: &mut RunCache<'_>, base: &FittedVariant<'_>) -> Result<Vec<Unkn
     Ok(forces)
 }
 
+/// The terms that may stand in place of what is told, without a run. An effect of a field stands for a dependence in its own equation; what is of
+/// no field, and an instrument's error, may be any dependence in the equations that the data feel most.
+fn in_place_of(
+    found: &SearchResult<'_>,
+    named: usize,
+    known: &[Candidate],
+    tracks: &[Track],
+    forces: &[UnknownInput],
+) -> Proposals {
+    let judged = &found.judged[named];
+    let Some(effect) = sole_effect(judged) else { return Proposals::default() };
+    if !is_of_a_field(effect.candidate.kind) {
+        return made(found, known, tracks, forces);
+    }
+    let (study, theta) = first_trained(found);
+    let values = judged.fit.values_of(0);
+    proposals::in_place_of(study, &theta, tracks, (effect.candidate, &values[1..]), known)
+}
+
+/// The study of the model as it is, and its parameters in the first trained record.
+fn first_trained<'f>(found: &'f SearchResult<'_>) -> (&'f Study, Vec<f64>) {
+    let study = &found.base.variant.study;
+    let record = study.records.iter().position(Record::is_trained).unwrap_or(0);
+    (study, study.theta_for(record, found.base.theta().as_slice()))
+}
+
 /// The terms that predict the unknown inputs.
 fn made(
     found: &SearchResult<'_>,
@@ -157,9 +195,7 @@ fn made(
     tracks: &[Track],
     forces: &[UnknownInput],
 ) -> Proposals {
-    let study = &found.base.variant.study;
-    let record = study.records.iter().position(Record::is_trained).unwrap_or(0);
-    let theta = study.theta_for(record, found.base.theta().as_slice());
+    let (study, theta) = first_trained(found);
     proposals::proposals(study, &theta, tracks, forces, known)
 }
 

@@ -5,6 +5,7 @@
 
 mod finite;
 mod modulated_forms;
+pub(crate) mod other_forms;
 mod pairs;
 mod race;
 mod ranking;

@@ -92,6 +92,13 @@ impl<'c> FittedVariant<'c> {
         self.solver.best().0
     }
 
+    /// The values of the parameters of an added effect, physical, the amplitude first.
+    pub(crate) fn values_of(&self, effect: usize) -> Vec<f64> {
+        let (first, theta) = (self.variant.first_entry_of(effect), self.theta());
+        let entries = first..first + self.variant.effects[effect].candidate.def.parameters.len();
+        entries.map(|j| self.variant.study.theta[j].transform.to_physical(theta[j])).collect()
+    }
+
     /// The whitened residuals of the training rows at the best point.
     pub(crate) fn residual(&self) -> &DVector<f64> {
         self.solver.best().1

@@ -36,7 +36,7 @@ pub(super) struct Searcher<'s, 'l, 'c> {
     /// Candidates were asked for by name, so that each is refitted whatever its score says.
     pub(super) asked: bool,
     /// The kinds of effects that are tried.
-    tried: &'static [Kind],
+    pub(super) tried: &'static [Kind],
 }
 
 /// Kinds that are tried first, and those that are where effects are asked for by name.
@@ -135,12 +135,12 @@ pub(crate) fn search_further<'c>(
 }
 
 /// Largest fall of χ² in a screening, to first order, with an amplitude of a sign that physics allows.
-fn largest_gain(screening: &[ScreeningResult], candidates: &[Candidate]) -> f64 {
+pub(super) fn largest_gain(screening: &[ScreeningResult], candidates: &[Candidate]) -> f64 {
     screening.iter().map(|h| h.allowed_gain(candidates[h.candidate].sign())).fold(0.0, f64::max)
 }
 
 /// The scores that a search reaches by chance at a fit.
-fn null_distribution(
+pub(super) fn null_distribution(
     cache: &RunCache<'_>,
     fit: &FittedVariant<'_>,
     screening: &[ScreeningResult],

@@ -2,16 +2,20 @@
 //!
 //! Every term of a small grammar ([`grammar`]) is fitted to the unknown input. They are ranked by how well they predict parts of it that the
 //! fit has not seen, with one sign throughout ([`recovered`]), and the first become candidates like any other: they are run, refitted and
-//! judged, and pay for all the terms that were looked at. Next file to read: [`crate::refit::search`].
+//! judged, and pay for all the terms that were looked at. The same grammar makes the terms that may stand in place of one that was named
+//! ([`likeness`]). Next file to read: [`crate::refit::search`].
 
 mod grammar;
+mod likeness;
 mod recovered;
+mod taken_up;
 
 use starlings_models::EffectDef;
 use starlings_study::Study;
 use starlings_study::checked::{Library, PROPOSALS};
 
 use self::grammar::grammar;
+use self::likeness::Likeness;
 use self::recovered::Recovered;
 use super::natural_amplitude::{ReferenceRun, along_run};
 use crate::fit::candidate::Candidate;
@@ -22,6 +26,8 @@ use crate::options::Options;
 
 /// Terms of one equation that become candidates.
 const MOST: usize = 60;
+/// Terms that are tried in place of one that was named, in each of its equations.
+const NEAREST: usize = 24;
 
 /// Terms made from unknown inputs.
 #[derive(Debug, Default)]
@@ -68,6 +74,31 @@ pub(crate) fn proposals(
             .collect();
         scored.sort_by(|a, b| b.0.total_cmp(&a.0));
         all.candidates.extend(scored.into_iter().take(MOST).map(|(_, candidate)| candidate));
+    }
+    all
+}
+
+/// The terms most like what an effect adds to the equations of states, of a form that none of `known` has: what may stand in its place.
+/// `theta` and `tracks` as in [`proposals`], `inner` are the values of the parameters inside the effect. None where the effect has a memory
+/// of its own, or adds to no equation.
+pub(crate) fn in_place_of(
+    study: &Study,
+    theta: &[f64],
+    tracks: &[Track],
+    effect: (&Candidate, &[f64]),
+    known: &[Candidate],
+) -> Proposals {
+    let run = ReferenceRun { study, theta, tracks };
+    let is_new = |def: &EffectDef| !known.iter().any(|other| same_form(&other.def, def));
+    let mut all = Proposals::default();
+    for add in &effect.0.def.adds {
+        let Some(named) = Likeness::new(&run, effect, add) else { continue };
+        let made = grammar(study, &add.to, tracks).into_iter().filter(is_new);
+        let made = made.map(|def| Candidate::new(def).of_kind(Kind::Proposal));
+        let mut scored: Vec<(f64, Candidate)> = made.map(|c| (named.of(&run, &c), c)).collect();
+        all.considered += scored.len();
+        scored.sort_by(|a, b| b.0.total_cmp(&a.0));
+        all.candidates.extend(scored.into_iter().take(NEAREST).map(|(_, candidate)| candidate));
     }
     all
 }

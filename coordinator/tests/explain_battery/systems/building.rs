@@ -69,6 +69,15 @@ adds = [ { to = "air", term = "b_party*exp(-((t - at_party)/4)^2)" } ]
 parameters = [ { name = "b_party", range = [-50, 50] }, { name = "at_party", grid = [50, 100], range = [20, 150] } ]
 "#;
 
+/// Sunshine through windows that let more of a bright sun in: a form of proposals alone, by whose name it goes.
+const UNLISTED: &str = r#"
+[[effects]]
+name = "even-square:air:sun"
+says = "Heat with the square of the sunshine."
+adds = [ { to = "air", term = "b_bright*sun^2" } ]
+parameters = [ { name = "b_bright", range = [0, 50] } ]
+"#;
+
 const HOUR: f64 = std::f64::consts::TAU / 24.0;
 
 /// Days of unequal warmth.
@@ -106,7 +115,7 @@ pub(super) fn system() -> System {
         name: "building",
         text: TEXT,
         aliens: ALIENS,
-        unlisted: "",
+        unlisted: UNLISTED,
         span: 240.0,
         inputs: &[("ambient", ambient), ("heating", heating), ("sun", sun)],
         channels: &["indoor"],

@@ -61,6 +61,15 @@ adds = [ { to = "w", term = "b_climb*sin(1.3*t + g_climb*t^2)" } ]
 parameters = [ { name = "b_climb", range = [-50, 50] }, { name = "g_climb", grid = [0.05, 0.09], range = [0.01, 0.2] } ]
 "#;
 
+/// Damping in a bearing that tightens with the deflection: a form of proposals alone, by whose name it goes.
+const UNLISTED: &str = r#"
+[[effects]]
+name = "size-times:w:a:w"
+says = "Damping that grows with the size of the deflection."
+adds = [ { to = "w", term = "b_tight*abs(a)*w" } ]
+parameters = [ { name = "b_tight", range = [-50, 0] } ]
+"#;
+
 /// Tones below the small-angle frequency of 3 rad/s: swings of about one radian that never go over the top, where the smallest
 /// difference would decide all that follows.
 fn torque(t: f64) -> f64 {
@@ -86,7 +95,7 @@ pub(super) fn system() -> System {
         name: "pendulum",
         text: TEXT,
         aliens: ALIENS,
-        unlisted: "",
+        unlisted: UNLISTED,
         span: 30.0,
         inputs: &[("torque", torque)],
         channels: &["angle"],

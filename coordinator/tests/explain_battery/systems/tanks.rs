@@ -81,6 +81,15 @@ adds = [ { to = "h2", term = "b_bucket*exp(-((t - at_bucket)/3)^2)" } ]
 parameters = [ { name = "b_bucket", range = [-20, 20] }, { name = "at_bucket", grid = [25, 40], range = [10, 60] } ]
 "#;
 
+/// A loss that grows with the cube of the level: a form of proposals alone, by whose name it goes.
+const UNLISTED: &str = r#"
+[[effects]]
+name = "cube:h2:h2"
+says = "A loss with the cube of the second level."
+adds = [ { to = "h2", term = "b_steep*h2^3" } ]
+parameters = [ { name = "b_steep", range = [-50, 0] } ]
+"#;
+
 /// A pump that is turned up and down between 0.3 and 2 dm/s.
 fn pump(t: f64) -> f64 {
     let slow = (0.11 * t).sin() + 0.7 * (0.29 * t + 1.0).sin() + 0.5 * (0.047 * t + 2.0).sin();
@@ -106,7 +115,7 @@ pub(super) fn system() -> System {
         name: "tanks",
         text: TEXT,
         aliens: ALIENS,
-        unlisted: "",
+        unlisted: UNLISTED,
         span: 100.0,
         inputs: &[("pump", pump)],
         channels: &["first", "last"],
