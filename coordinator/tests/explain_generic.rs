@@ -5,7 +5,7 @@ mod reactor_kit;
 mod study_kit;
 
 use reactor_kit::{NOISE, explained, reactor, recorded};
-use starlings_coordinator::explain::{Kind, Options, Verdict, candidates};
+use starlings_coordinator::explain::{Explanation, Kind, Options, Verdict, candidates};
 use starlings_coordinator::study::twin::{Twin, simulate};
 use study_kit::{Case, csv, grid, normals};
 
@@ -58,21 +58,56 @@ adds = [ { to = "v", term = "-b*x^2*v" } ]
 parameters = [ { name = "b", unit = "1/(m^2 s)", range = [0, 1] } ]
 "#;
 
-#[test]
-fn a_term_that_nobody_listed_is_proposed_by_its_form() {
+/// Damping with the cube of the velocity.
+const STEEP: &str = r#"
+[[effects]]
+name = "steep"
+says = "Damping with the cube of the velocity."
+adds = [ { to = "v", term = "-b*v^3" } ]
+parameters = [ { name = "b", unit = "s/m^2", range = [0, 1] } ]
+"#;
+
+/// What is found in a recording of a swing with this effect in it, of which the study knows nothing.
+fn found_in(study: &str, effect: &str, name: &str, amplitude: f64) -> Explanation {
     let times = grid(400, 0.05);
     let blank = csv("time,laser", &[&times, &vec![1.0; times.len()]]);
     let twin = Twin {
         values: [("k", 4.2), ("c", 0.08)].map(|(name, v)| (name.to_owned(), v)).to_vec(),
-        effects: vec![("deflection".to_owned(), 0.2)],
+        effects: vec![(name.to_owned(), amplitude)],
         seed: 1,
         ..Twin::default()
     };
-    let truth = Case::new(&format!("{SWING}{DEFLECTION}"), &[("swing.csv", blank)]);
+    let truth = Case::new(&format!("{study}{effect}"), &[("swing.csv", blank)]);
     let made = simulate(&truth.study(), &twin).unwrap();
     let clean = &made.values[made.columns.iter().position(|c| c == "laser").unwrap()];
     let noisy: Vec<f64> = clean.iter().zip(normals(times.len(), 5)).map(|(v, e)| v + 0.01 * e).collect();
-    let found = explained(&Case::new(SWING, &[("swing.csv", csv("time,laser", &[&times, &noisy]))])).unwrap();
+    explained(&Case::new(study, &[("swing.csv", csv("time,laser", &[&times, &noisy]))])).unwrap()
+}
+
+#[test]
+fn a_name_is_told_beside_the_form_that_the_data_do_not_tell_from_it() {
+    let with_roles = SWING
+        .replace("unit = \"m\", value", "unit = \"m\", role = \"displacement\", value")
+        .replace("unit = \"m\"\n", "unit = \"m\"\nrole = \"displacement\"\n")
+        .replace("unit = \"m/s\"\n", "unit = \"m/s\"\nrole = \"velocity\"\n");
+    let found = found_in(&with_roles, STEEP, "steep", 0.005);
+    let said = &found.headline;
+    assert_eq!(found.verdict, Verdict::Tie, "{said}");
+    assert_eq!(
+        (found.effects[0].name.as_str(), found.effects[0].kind),
+        ("quadratic-drag", Kind::Library),
+        "{said}"
+    );
+    assert!(found.tied_with.contains(&vec!["cube:v:v".to_owned()]), "{said}");
+    assert!(
+        said.contains("told first, since effects of the library are held likelier than proposals"),
+        "{said}"
+    );
+}
+
+#[test]
+fn a_term_that_nobody_listed_is_proposed_by_its_form() {
+    let found = found_in(SWING, DEFLECTION, "deflection", 0.2);
     let said = &found.headline;
     assert!(matches!(found.verdict, Verdict::Named | Verdict::Tie), "{said}");
     assert_eq!(found.effects[0].name, "square-times:v:x:v", "{said}");

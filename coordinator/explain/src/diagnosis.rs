@@ -56,10 +56,8 @@ pub(super) fn diagnose<R>(
     then: impl FnOnce(&mut RunCache<'_>, Diagnosis<'_, '_>) -> Result<R, ExplainError>,
 ) -> Result<R, ExplainError> {
     let mut start = None;
-    if let Ok(known) = candidates(study, options) {
-        let of: Vec<Candidate> = known.into_iter().map(|def| kinded(study, def)).collect();
-        foresee(cache, &of, options);
-    }
+    let defs = candidates(study, options)?;
+    foresee(cache, &kinded(study, defs.iter().cloned()), options);
     for round in 1.. {
         let base = fit_as_it_is(cache, study, start, options)?;
         start = Some(base.z().clone());
@@ -67,7 +65,7 @@ pub(super) fn diagnose<R>(
         let tracks = cache.tracks(&Point { study, theta: base.theta() })?;
         let (periods, change_points) =
             (periods(&cache.rows, &base.predicted), change_points(&cache.rows, &base.predicted));
-        let candidates = resolved_candidates(study, &tracks, &periods, &change_points, options)?;
+        let candidates = resolved_candidates(study, &defs, &tracks, &periods, &change_points);
         foresee(cache, &candidates, options);
         let proposed = OnceCell::new();
         let mut found = search(cache, base, &candidates, &tracks, options)?;

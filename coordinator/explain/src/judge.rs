@@ -27,35 +27,42 @@ mod tests {
     use std::collections::BTreeSet;
     use std::path::Path;
 
-    /// `NAME | file | value` of every number that stands at the head of a file of this folder.
-    fn numbers(folder: &Path, prefix: &str, found: &mut BTreeSet<String>) {
-        for entry in std::fs::read_dir(folder).unwrap().flatten() {
-            let (path, name) = (entry.path(), entry.file_name().to_string_lossy().into_owned());
-            let Ok(text) = std::fs::read_to_string(&path) else { continue };
-            let constants = text
-                .lines()
-                .filter(|line| !line.starts_with(' '))
-                .filter_map(|line| line.split_once("const "));
-            for (name_and_type, value) in constants.filter_map(|(_, rest)| rest.split_once(" = ")) {
-                let (constant, kind) = name_and_type.split_once(": ").unwrap();
-                if kind.contains("f64") || kind == "usize" {
-                    found
-                        .insert(format!("`{constant}` | `{prefix}{name}` | {}", value.trim_end_matches(';')));
+    /// `NAME | file | value` of every number that stands at the head of a file, or of the files of a folder.
+    fn numbers(path: &Path, name: &str, found: &mut BTreeSet<String>) {
+        if path.is_dir() {
+            for entry in std::fs::read_dir(path).unwrap().flatten() {
+                let below = format!("{name}/{}", entry.file_name().to_string_lossy());
+                if entry.path().is_file() {
+                    numbers(&entry.path(), &below, found);
                 }
+            }
+            return;
+        }
+        let text = std::fs::read_to_string(path).unwrap();
+        let constants =
+            text.lines().filter(|line| !line.starts_with(' ')).filter_map(|line| line.split_once("const "));
+        for (name_and_type, value) in constants.filter_map(|(_, rest)| rest.split_once(" = ")) {
+            let (constant, kind) = name_and_type.split_once(": ").unwrap();
+            if kind.contains("f64") || kind == "usize" {
+                found.insert(format!("`{constant}` | `{name}` | {}", value.trim_end_matches(';')));
             }
         }
     }
 
     #[test]
-    fn the_page_lists_every_number_of_the_decision_with_its_value() {
+    fn the_page_lists_every_number_of_the_decision_and_of_the_race_with_its_value() {
         let of = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let places =
+            ["judge", "refit/race.rs", "refit/other_forms.rs", "screen/proposals.rs", "screen/proposals"];
         let mut code = BTreeSet::new();
-        numbers(&of.join("src/judge"), "coordinator/explain/src/judge/", &mut code);
+        for place in places {
+            numbers(&of.join("src").join(place), &format!("coordinator/explain/src/{place}"), &mut code);
+        }
         let page = std::fs::read_to_string(of.join("../../docs/explain.md")).unwrap();
-        let rows = page
+        let is_row = |line: &&str| line.starts_with("| `") && line.contains("` | `coordinator/explain/src/");
+        let listed: BTreeSet<String> = page
             .lines()
-            .filter(|line| line.starts_with("| `") && line.contains("` | `coordinator/explain/src/judge/"));
-        let listed: BTreeSet<String> = rows
+            .filter(is_row)
             .map(|row| row.trim_start_matches("| ").split(" | ").take(3).collect::<Vec<_>>().join(" | "))
             .collect();
         assert_eq!(listed, code);

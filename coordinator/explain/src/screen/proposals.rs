@@ -17,7 +17,7 @@ use starlings_study::checked::{Library, PROPOSALS};
 use self::grammar::grammar;
 use self::likeness::Likeness;
 use self::recovered::Recovered;
-use super::natural_amplitude::{ReferenceRun, along_run};
+use super::along_run::{ReferenceRun, along_run};
 use crate::fit::candidate::Candidate;
 use crate::fit::kind::Kind;
 use crate::fit::same_form::same_form;

@@ -6,31 +6,28 @@
 use starlings_models::effect::{EffectDef, Scale, scale};
 use starlings_study::{Record, Study};
 
-use super::candidates::{candidates, kind_of};
-use crate::error::ExplainError;
+use super::candidates::kind_of;
 use crate::fit::candidate::Candidate;
 use crate::locate::Track;
-use crate::options::Options;
 
-/// The candidates of a study, every number in the model's units. `tracks` are the courses of the model as it is.
-///
-/// # Errors
-/// As [`candidates`].
+/// The candidates made of these effects of a study, every number in the model's units. `tracks` are the courses of the model as it is.
 pub(crate) fn resolved_candidates(
     study: &Study,
+    defs: &[EffectDef],
     tracks: &[Track],
     periods: &[f64],
     change_points: &[f64],
-    options: &Options,
-) -> Result<Vec<Candidate>, ExplainError> {
-    let defs = resolved(study, candidates(study, options)?, tracks, periods, change_points);
-    Ok(defs.into_iter().map(|def| kinded(study, def)).collect())
+) -> Vec<Candidate> {
+    kinded(study, resolved(study, defs, tracks, periods, change_points))
 }
 
-/// A candidate with its kind.
-pub(crate) fn kinded(study: &Study, def: EffectDef) -> Candidate {
-    let kind = kind_of(study, &def.name);
-    Candidate::new(def).of_kind(kind)
+/// The candidates made of these effects as they are, with their kinds.
+pub(crate) fn kinded(study: &Study, defs: impl IntoIterator<Item = EffectDef>) -> Vec<Candidate> {
+    let candidate = |def: EffectDef| {
+        let kind = kind_of(study, &def.name);
+        Candidate::new(def).of_kind(kind)
+    };
+    defs.into_iter().map(candidate).collect()
 }
 
 /// The effects with their numbers in the model's units. An effect whose quantity is constant along the run is left out, since its
@@ -38,7 +35,7 @@ pub(crate) fn kinded(study: &Study, def: EffectDef) -> Candidate {
 /// an instant at their change points as well ([`super::residual_timing`]).
 fn resolved(
     study: &Study,
-    defs: Vec<EffectDef>,
+    defs: &[EffectDef],
     tracks: &[Track],
     periods: &[f64],
     change_points: &[f64],
@@ -47,8 +44,8 @@ fn resolved(
     let times = || study.records.iter().filter(|r| r.is_trained()).filter_map(Record::train_span);
     let from = times().map(|s| s[0]).fold(f64::INFINITY, f64::min);
     let to = times().map(|s| s[1]).fold(f64::NEG_INFINITY, f64::max);
-    let resolve = |def: EffectDef| {
-        let mut resolved = scale::resolve(&def, &course, [from, to], sampling(study));
+    let resolve = |def: &EffectDef| {
+        let mut resolved = scale::resolve(def, &course, [from, to], sampling(study));
         for wanted in def.parameters.iter().skip(1) {
             let Some(parameter) = resolved.parameters.iter_mut().find(|p| p.name == wanted.name) else {
                 continue;
@@ -64,7 +61,7 @@ fn resolved(
         }
         resolved
     };
-    defs.into_iter().map(resolve).filter(scale::is_resolved).collect()
+    defs.iter().map(resolve).filter(scale::is_resolved).collect()
 }
 
 /// The median interval between observations of the first trained record.

@@ -14,8 +14,9 @@ use super::probe::{MeasuredInfluence, Probe};
 use super::response::{ProbeOutcome, ProbeResponse, ResponseScale};
 use super::screening_result::{ScreeningResult, UNSEEN, Unmeasured};
 
+use super::along_run::ReferenceRun;
 use super::influence::Influence;
-use super::natural_amplitude::{ReferenceRun, natural_amplitude};
+use super::natural_amplitude::natural_amplitude;
 use crate::error::ExplainError;
 use crate::fit::candidate::Candidate;
 use crate::fit::fitted_variant::FittedVariant;

@@ -9,7 +9,7 @@ use starlings_study::Record;
 
 use super::taken_up::slopes;
 use crate::fit::candidate::Candidate;
-use crate::screen::natural_amplitude::{ReferenceRun, along_run};
+use crate::screen::along_run::{ReferenceRun, along_run};
 
 /// Steps of the record that are looked at, at most.
 const STEPS: usize = 200;
@@ -52,7 +52,7 @@ impl Likeness {
         } else {
             DMatrix::from_columns(&columns).qr().q()
         };
-        let own = own(&basis, DVector::from_vec(term))?;
+        let own = own(&basis, &DVector::from_vec(term))?;
         Some((basis, own))
     }
 
@@ -62,15 +62,15 @@ impl Likeness {
         let at = |point: &Vec<f64>| {
             let term = other.def.adds.first().map(|add| &add.term)?;
             let course = along_run(run, other, point, term, self.record, &self.steps)?;
-            Some(own(&self.taken_up, DVector::from_vec(course))?.dot(&self.own).abs())
+            Some(own(&self.taken_up, &DVector::from_vec(course))?.dot(&self.own).abs())
         };
         other.points.iter().filter_map(at).fold(0.0, f64::max)
     }
 }
 
 /// A course less its part along an orthonormal basis, of length one; `None` where no number is left of it.
-fn own(basis: &DMatrix<f64>, course: DVector<f64>) -> Option<DVector<f64>> {
-    let own = &course - basis * basis.tr_mul(&course);
+fn own(basis: &DMatrix<f64>, course: &DVector<f64>) -> Option<DVector<f64>> {
+    let own = course - basis * basis.tr_mul(course);
     let size = own.norm();
     (size > 0.0 && size.is_finite()).then(|| own / size)
 }
@@ -85,7 +85,7 @@ mod tests {
         let (basis, of_a) =
             Likeness::of_courses(&[swing.clone()], swing.iter().map(|s| a(*s)).collect()).unwrap();
         let of_b = DVector::from_iterator(100, swing.iter().map(|s| b(*s)));
-        own(&basis, of_b).unwrap().dot(&of_a).abs()
+        own(&basis, &of_b).unwrap().dot(&of_a).abs()
     }
 
     #[test]
@@ -101,7 +101,7 @@ mod tests {
 
     #[test]
     fn a_course_that_is_no_number_is_like_nothing() {
-        assert!(own(&DMatrix::zeros(2, 0), DVector::from_vec(vec![1.0, f64::NAN])).is_none());
-        assert!(own(&DMatrix::zeros(2, 0), DVector::zeros(2)).is_none());
+        assert!(own(&DMatrix::zeros(2, 0), &DVector::from_vec(vec![1.0, f64::NAN])).is_none());
+        assert!(own(&DMatrix::zeros(2, 0), &DVector::zeros(2)).is_none());
     }
 }

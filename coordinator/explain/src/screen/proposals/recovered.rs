@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::taken_up::slopes;
 use crate::locate::UnknownInput;
-use crate::screen::natural_amplitude::ReferenceRun;
+use crate::screen::along_run::ReferenceRun;
 
 /// Parts of the record, each of which is predicted from the others.
 const PARTS: usize = 5;

@@ -3,36 +3,80 @@
 //! Next file to read: [`super::recovered`].
 
 use nalgebra::DVector;
-use starlings_models::EffectDef;
 
-use crate::fit::candidate::Candidate;
-use crate::screen::natural_amplitude::{ReferenceRun, along_run};
+use crate::screen::along_run::{ReferenceRun, slope_along_run};
 
-/// Step of a difference, as a share of a parameter.
-const STEP: f64 = 1e-4;
-
-/// What the parameters change in the rate of a state at these steps of a record, one series for each that does; none where the model
-/// has no equations that can be read.
+/// The derivatives of the rate of a state by the parameters at these steps of a record, one series for each that it depends on; none where
+/// the model has no equations that can be read.
 pub(super) fn slopes(run: &ReferenceRun<'_>, state: &str, record: usize, steps: &[usize]) -> Vec<Vec<f64>> {
     let equations = run.study.setup.model.equations.as_ref();
     let Some(of) = equations.and_then(|e| e.states.iter().find(|s| s.name == state)) else {
         return Vec::new();
     };
-    let plain = Candidate::new(EffectDef::default());
-    let rate = |theta: &[f64]| -> Option<DVector<f64>> {
-        let moved = ReferenceRun { study: run.study, theta, tracks: run.tracks };
-        let mut sum = DVector::zeros(steps.len());
-        for (_, term) in &of.rate {
-            sum += DVector::from_vec(along_run(&moved, &plain, &[], term, record, steps)?);
-        }
-        Some(sum)
+    let slope = |parameter: &String| {
+        let terms =
+            of.rate.iter().filter_map(|(_, term)| slope_along_run(run, term, parameter, record, steps));
+        let sum = terms.fold(DVector::zeros(steps.len()), |sum, slope| sum + DVector::from_vec(slope));
+        (sum.amax() > 0.0 && sum.iter().all(|v| v.is_finite())).then(|| sum.as_slice().to_vec())
     };
-    let slope = |i: usize| {
-        let (mut up, mut down) = (run.theta.to_vec(), run.theta.to_vec());
-        let step = STEP * run.theta[i].abs().max(STEP);
-        (up[i], down[i]) = (up[i] + step, down[i] - step);
-        let slope = (rate(&up)? - rate(&down)?) / (2.0 * step);
-        (slope.amax() > 0.0 && slope.iter().all(|v| v.is_finite())).then(|| slope.as_slice().to_vec())
-    };
-    (0..run.theta.len()).filter_map(slope).collect()
+    run.study.setup.parameters.iter().filter_map(slope).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::locate::Track;
+    use starlings_study::Study;
+
+    const STUDY: &str = r#"
+[study]
+name = "leak"
+seed = 1
+
+[model]
+kind = "equations"
+outputs = [{ name = "level", value = "h" }]
+solver = { method = "fixed", step = 0.1 }
+
+[[model.states]]
+name = "h"
+initial = 1.0
+rate = { leak = "-k*sqrt(h)", pump = "q*k + q^2" }
+
+[[parameters]]
+name = "k"
+prior = { transform = "linear", median = 1.0, sd = 0.1 }
+
+[[parameters]]
+name = "q"
+prior = { transform = "linear", median = 1.0, sd = 0.1 }
+
+[[parameters]]
+name = "initial:h"
+prior = { transform = "linear", median = 1.0, sd = 0.1 }
+
+[[records]]
+name = "run"
+file = "data.csv"
+channels = [{ column = "h", output = "level", noise = 0.1 }]
+
+[estimator]
+kind = "batch"
+"#;
+
+    #[test]
+    fn the_slopes_of_a_rate_are_those_of_all_its_terms_by_every_parameter_that_it_reads() {
+        let folder = std::env::temp_dir().join(format!("starlings-taken-up-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        std::fs::write(folder.join("data.csv"), "time,h\n0,1\n1,1\n2,1\n").unwrap();
+        std::fs::write(folder.join("study.toml"), STUDY).unwrap();
+        let study = Study::load(&folder.join("study.toml")).unwrap();
+        std::fs::remove_dir_all(&folder).unwrap();
+        let level = vec![4.0, 1.0, 9.0];
+        let track = Track { name: "h".to_owned(), unit: String::new(), values: vec![level] };
+        let run = ReferenceRun { study: &study, theta: &[2.0, 3.0, 4.0], tracks: &[track] };
+        // By k: q − √h; by q: k + 2 q; the initial value does not enter.
+        assert_eq!(slopes(&run, "h", 0, &[0, 1, 2]), [vec![1.0, 2.0, 0.0], vec![8.0; 3]]);
+        assert!(slopes(&run, "v", 0, &[0]).is_empty(), "no such state");
+    }
 }
