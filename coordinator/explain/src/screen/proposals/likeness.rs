@@ -83,7 +83,8 @@ mod tests {
     fn alike(a: fn(f64) -> f64, b: fn(f64) -> f64) -> f64 {
         let swing: Vec<f64> = (0..100).map(|k| (0.37 * f64::from(k)).sin()).collect();
         let (basis, of_a) =
-            Likeness::of_courses(&[swing.clone()], swing.iter().map(|s| a(*s)).collect()).unwrap();
+            Likeness::of_courses(std::slice::from_ref(&swing), swing.iter().map(|s| a(*s)).collect())
+                .unwrap();
         let of_b = DVector::from_iterator(100, swing.iter().map(|s| b(*s)));
         own(&basis, &of_b).unwrap().dot(&of_a).abs()
     }
