@@ -3,7 +3,7 @@
 //! [`crate::screen::screening`] scores every candidate at the fitted model. The best run a short race, whose first step costs
 //! one run each; the first few of it are refitted with every parameter free and judged ([`crate::judge::gates`]). The second
 //! pass ([`super::second_pass`]) scores the candidates again at the best variant and tries replacements and pairs. Terms that
-//! the study calls replaceable are left out in turn, and the search is repeated without them. Next file to read:
+//! the study calls replaceable are left out in turn, with an effect in their place ([`super::replacements`]). Next file to read:
 //! [`crate::judge::verdict`].
 
 use super::ranking::{largest_of_each, order};
