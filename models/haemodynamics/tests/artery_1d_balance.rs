@@ -227,7 +227,7 @@ fn a_layout_that_makes_no_network_is_refused_with_its_place_and_a_remedy() {
     twins["segments"][1]["name"] = serde_json::json!("a_2");
     let (path, text) = refused(&twins);
     assert_eq!(path, "segments[1].name");
-    assert!(text.contains("modulus of `a_2` is `E_a_2`, and so is another: rename"), "{text}");
+    assert!(text.contains("stiffness of `a_2` is `E_a_2`, and so is another: rename"), "{text}");
     let mut island = good.clone();
     island["segments"].as_array_mut().unwrap().extend(["c", "d"].map(|name| {
         serde_json::json!({ "name": name, "from": "p", "to": "q", "length": 5.0, "radius": 1.0, "thickness": 0.1 })
