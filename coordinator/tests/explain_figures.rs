@@ -15,10 +15,12 @@ fn every_verdict_has_its_figures_with_units_and_every_tied_set_its_own() {
     // Names of effects that were screened, whether the study's own or other forms of them.
     let is_screened = |name: &String| full.screened.iter().any(|screened| screened.name == *name);
     assert!(full.tied_with.iter().flatten().all(is_screened), "{:?}", full.tied_with);
-    assert!(full.tied_with.contains(&vec!["seep".to_owned()]), "{:?}", full.tied_with);
     assert_eq!(full.tied_gap.len(), full.tied_with.len());
+    let of_set = |set: &[&str]| full.tied_with.iter().position(|tied| tied == set).map(|i| &full.tied_gap[i]);
+    assert_eq!(of_set(&["seep"]).unwrap().len(), full.gap.len(), "it was refitted");
     for (set, gap) in full.tied_with.iter().zip(&full.tied_gap) {
-        assert_eq!(gap.len(), full.gap.len(), "{set:?} was refitted");
+        // One that does the same as what is shown is tied without a refit.
+        assert!([0, full.gap.len()].contains(&gap.len()), "{set:?}: {gap:?}");
         assert!(gap.iter().all(|row| row.after < row.before), "{gap:?}");
     }
     let unseen = full.screened.iter().find(|s| s.name == "unseen").unwrap();
