@@ -45,7 +45,7 @@ def test_a_run_is_one_bar_that_only_grows(bars, tmp_path):
     assert percents == sorted(percents) and 0.0 < percents[-1] <= 100.0
     # Where the bar is made tqdm ends what it says with a colon of its own.
     said = [words for _, words, _ in looks[1:]]
-    assert said[0] == "run: pass 1, 1 of 401 analyses"
+    assert said[0] == "run: pass 1, 0 of 401 analyses"
     assert any(words.startswith("run: after the fit, ") for words in said)
     assert not any("observer" in words or ": :" in words or "0 runs" in words for words in said)
     assert any("left" in (rest or "") for _, _, rest in looks)

@@ -190,11 +190,23 @@ fn rivals(cache: &RunCache<'_>, found: &SearchResult<'_>, passing: &[usize], bes
         *i != best
             && judged.fit.variant.effects.len() == size
             && judged.names() != of_best.names()
+            && (apart <= 0.0 || !elaborates(judged, of_best))
             && (apart < MARGIN * of_best.inflation
                 || (apart < 2.0 * MARGIN * of_best.inflation
                     && apart < VUONG * scatter(cache, of_best, judged)))
     };
     passing.iter().copied().filter(near).collect()
+}
+
+/// Whether a variant of forms that stand for no cause has more values inside its terms than the best: one that does no better with them is an
+/// elaboration of what is told, as a clamp beyond all values is of what it clamps, and no rival of it.
+fn elaborates(judged: &JudgedFit<'_>, best: &JudgedFit<'_>) -> bool {
+    let n_inner = |judged: &JudgedFit<'_>| {
+        let effects = judged.fit.variant.effects.iter();
+        effects.map(|effect| effect.candidate.def.parameters.len().saturating_sub(1)).sum::<usize>()
+    };
+    judged.fit.variant.effects.iter().all(|effect| effect.candidate.kind.is_of_no_field())
+        && n_inner(judged) > n_inner(best)
 }
 
 /// Standard deviation of the difference in χ² of two variants, over all rows.
@@ -220,7 +232,8 @@ fn complexity(judged: &JudgedFit<'_>) -> usize {
     terms.filter_map(|add| size(&add.term)).map(|program| program.n_operations()).sum()
 }
 
-/// Candidates that were not refitted and whose influence cannot be told from that of the best.
+/// Candidates that were not refitted and whose influence cannot be told from that of the best. A form that stands for no cause has lost the
+/// race to the best: it is one where the part of the gain that their influences do not share is within the margin too.
 fn twins(
     cache: &RunCache<'_>,
     found: &SearchResult<'_>,
@@ -234,7 +247,7 @@ fn twins(
     };
     let best = found.screening.iter().filter(|h| h.candidate == effect.index && h.failure.is_none());
     let Some(best) = best.max_by(|a, b| a.score.gain.total_cmp(&b.score.gain)) else { return Ok(Vec::new()) };
-    let best = own(best)?;
+    let (gain, best) = (best.score.gain, own(best)?);
     let mut twins: Vec<Vec<String>> = Vec::new();
     for result in found.screening.iter().filter(|h| h.failure.is_none() && !h.is_absorbed()) {
         let refitted = found
@@ -246,7 +259,9 @@ fn twins(
         let candidate = &candidates[result.candidate];
         let name = vec![candidate.name().to_owned()];
         let allowed = result.allowed_gain(candidate.sign()) > 0.0;
-        if !refitted && allowed && alike > ALIKE && !twins.contains(&name) {
+        let has_lost =
+            candidate.kind.is_of_no_field() && gain * (1.0 - alike * alike) > MARGIN * judged.inflation;
+        if !refitted && allowed && alike > ALIKE && !has_lost && !twins.contains(&name) {
             twins.push(name);
         }
     }
