@@ -67,12 +67,29 @@ adds = [ { to = "v", term = "-b*v^3" } ]
 parameters = [ { name = "b", unit = "s/m^2", range = [0, 1] } ]
 "#;
 
+/// Damping in proportion to the velocity.
+const PLAIN: &str = r#"
+[[effects]]
+name = "plain"
+says = "Damping in proportion to the velocity."
+adds = [ { to = "v", term = "-b*v" } ]
+parameters = [ { name = "b", unit = "1/s", range = [0, 1] } ]
+"#;
+
+/// True values of the parameters of the swing.
+const SWINGS: [(&str, f64); 2] = [("k", 4.2), ("c", 0.08)];
+
 /// What is found in a recording of a swing with this effect in it, of which the study knows nothing.
-fn found_in(study: &str, effect: &str, name: &str, amplitude: f64) -> Explanation {
+fn found_in(
+    study: &str,
+    effect: &str,
+    (name, amplitude): (&str, f64),
+    values: &[(&str, f64)],
+) -> Explanation {
     let times = grid(400, 0.05);
     let blank = csv("time,laser", &[&times, &vec![1.0; times.len()]]);
     let twin = Twin {
-        values: [("k", 4.2), ("c", 0.08)].map(|(name, v)| (name.to_owned(), v)).to_vec(),
+        values: values.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect(),
         effects: vec![(name.to_owned(), amplitude)],
         seed: 1,
         ..Twin::default()
@@ -84,13 +101,17 @@ fn found_in(study: &str, effect: &str, name: &str, amplitude: f64) -> Explanatio
     explained(&Case::new(study, &[("swing.csv", csv("time,laser", &[&times, &noisy]))])).unwrap()
 }
 
-#[test]
-fn a_name_is_told_beside_the_form_that_the_data_do_not_tell_from_it() {
-    let with_roles = SWING
+/// The swing with the roles of its states and its output.
+fn swing_with_roles() -> String {
+    SWING
         .replace("unit = \"m\", value", "unit = \"m\", role = \"displacement\", value")
         .replace("unit = \"m\"\n", "unit = \"m\"\nrole = \"displacement\"\n")
-        .replace("unit = \"m/s\"\n", "unit = \"m/s\"\nrole = \"velocity\"\n");
-    let found = found_in(&with_roles, STEEP, "steep", 0.005);
+        .replace("unit = \"m/s\"\n", "unit = \"m/s\"\nrole = \"velocity\"\n")
+}
+
+#[test]
+fn a_name_is_told_beside_the_form_that_the_data_do_not_tell_from_it() {
+    let found = found_in(&swing_with_roles(), STEEP, ("steep", 0.005), &SWINGS);
     let said = &found.headline;
     assert_eq!(found.verdict, Verdict::Tie, "{said}");
     assert_eq!(
@@ -106,8 +127,23 @@ fn a_name_is_told_beside_the_form_that_the_data_do_not_tell_from_it() {
 }
 
 #[test]
+fn a_name_is_told_alone_where_other_forms_only_elaborate_it_or_lose() {
+    // Without a damping of its own: a clamp of the velocity beyond all velocities, and dampings that lost the race, are no ties.
+    let study = swing_with_roles();
+    let (before, damping) = study.split_once("[[parameters]]\nname = \"c\"").unwrap();
+    let after = &damping[damping.find("[[records]]").unwrap()..];
+    let undamped = format!("{before}{after}").replace(" - c*v", "");
+    let found = found_in(&undamped, PLAIN, ("plain", 0.2), &SWINGS[..1]);
+    assert_eq!(found.effects[0].name, "viscous-friction", "{}", found.headline);
+    let is_form = |name: &String| name.contains(':');
+    assert!(!found.tied_with.iter().flatten().any(is_form), "{}", found.headline);
+    let was_tried = |name: &str| found.screened.iter().any(|screened| screened.name == name);
+    assert!(was_tried("clamped:v:v"), "its elaboration was looked at: {:?}", found.screened);
+}
+
+#[test]
 fn a_term_that_nobody_listed_is_proposed_by_its_form() {
-    let found = found_in(SWING, DEFLECTION, "deflection", 0.2);
+    let found = found_in(SWING, DEFLECTION, ("deflection", 0.2), &SWINGS);
     let said = &found.headline;
     assert!(matches!(found.verdict, Verdict::Named | Verdict::Tie), "{said}");
     assert_eq!(found.effects[0].name, "square-times:v:x:v", "{said}");
