@@ -33,6 +33,8 @@ pub(crate) struct Nudging {
 
 /// The most corrected components whose stability is looked at: a dense eigenvalue problem of that size.
 const MOST: usize = 300;
+/// γΔt beyond which a correction takes the whole innovation, to rounding.
+const WHOLE: f64 = 50.0;
 /// Share of the largest eigenvalue below which one is zero: slopes are differences of outputs.
 const ROUNDING: f64 = 1e-6;
 
@@ -82,6 +84,22 @@ impl Nudging {
             outputs.iter().map(|output| slopes[(*output, j)]).sum::<f64>() / outputs.len() as f64
         })
     }
+
+    /// Whether no eigenvalue of 1 − K H is above one in modulus where γΔt is `strength`: a state with n rows is pulled by k = 1 − e^(−nγΔt)
+    /// of its innovation.
+    fn is_stable(&self, observation: &DMatrix<f64>, strength: f64) -> bool {
+        let mut pulled = observation.clone();
+        for (mut row, (_, rows)) in pulled.row_iter_mut().zip(&self.channels) {
+            row.scale_mut(-(-(rows.len() as f64) * strength).exp_m1());
+        }
+        let eigenvalues = pulled.complex_eigenvalues();
+        let largest = eigenvalues.iter().map(|value| value.norm()).fold(0.0, f64::max);
+        // |1 − λ| ≤ 1 for |λ|² ≤ 2 Re λ. Of zero, to rounding, are those of states that no output shows.
+        let is_within = |norm: f64, re: f64| norm.powi(2) <= 2.0 * re * (1.0 + 1e-9);
+        eigenvalues
+            .iter()
+            .all(|value| value.norm() <= ROUNDING * largest || is_within(value.norm(), value.re))
+    }
 }
 
 impl Observer for Nudging {
@@ -108,14 +126,22 @@ impl Observer for Nudging {
         if observation.iter().any(|slope| !slope.is_finite()) {
             return None;
         }
-        let eigenvalues = observation.complex_eigenvalues();
-        let largest = eigenvalues.iter().map(|value| value.norm()).fold(0.0, f64::max);
-        // |1 − kλ| ≤ 1 for k ≤ 2 Re λ/|λ|². Of zero, to rounding, are those of states that no output shows.
-        let shown = eigenvalues.iter().filter(|value| value.norm() > ROUNDING * largest);
-        let most = shown.map(|value| (2.0 * value.re / value.norm_sqr()).max(0.0)).reduce(f64::min)?;
-        // k = 1 − e^(−nγΔt) of a state with n rows: that with the most takes the largest part.
-        let n_row = self.channels.iter().map(|(_, rows)| rows.len()).max()?;
-        (most < 1.0).then(|| -(-most).ln_1p() / (n_row as f64 * dt))
+        // From gains that hardly pull to those that take the whole innovation.
+        let strengths = (0..=80).map(|k| WHOLE * 10_f64.powf(-0.1 * f64::from(80 - k)));
+        let (mut stable, mut unstable) = (0.0, None);
+        for strength in strengths {
+            if !self.is_stable(&observation, strength) {
+                unstable = Some(strength);
+                break;
+            }
+            stable = strength;
+        }
+        let mut unstable = unstable?;
+        while stable > 0.0 && unstable / stable > 1.0 + 1e-9 {
+            let middle = f64::midpoint(stable, unstable);
+            if self.is_stable(&observation, middle) { stable = middle } else { unstable = middle }
+        }
+        Some(stable / dt)
     }
 
     fn feedback(&self, model: &dyn Model, theta: &[f64]) -> DMatrix<f64> {

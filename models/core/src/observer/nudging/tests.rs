@@ -171,7 +171,7 @@ fn a_model_without_measured_states_is_refused() {
     assert!(error.to_string().contains("corrects nothing"), "{error}");
 }
 
-/// x and v, and outputs of both: x + 3 v, and −x.
+/// x and v, and outputs of one or both.
 fn mixed() -> EquationsModel {
     let mut def = EquationsDef {
         states: [("x", "1"), ("v", "0")]
@@ -189,7 +189,19 @@ fn mixed() -> EquationsModel {
         value: value.to_owned(),
         ..OutputDef::default()
     };
-    def.outputs = [("a", "x + 3*v"), ("b", "3*x + v"), ("c", "3*x"), ("d", "-x")].map(output).into();
+    def.outputs = [
+        ("a", "x + 3*v"),
+        ("b", "3*x + v"),
+        ("c", "3*x"),
+        ("d", "-x"),
+        ("e", "v"),
+        ("f", "v"),
+        ("g", "v - 0.6*x"),
+        ("h", "v - 0.6*x"),
+        ("i", "v - 2*x"),
+    ]
+    .map(output)
+    .into();
     EquationsModel::new(&def).expect("a model")
 }
 
@@ -216,6 +228,11 @@ fn the_largest_stable_gain_is_that_of_the_eigenvalues_of_what_is_observed() {
     // Crossed, H = [3 1; 1 3] has 4 and 2: k < 2/4 of the whole innovation, γΔt < ln 2.
     close(most(&[("b", "x"), ("a", "v")]), 2.0_f64.ln() / 0.5);
     assert_eq!(most(&[("d", "x")]), Some(0.0), "an output that falls as its state rises");
+    // Of states with other numbers of rows every one is pulled by a part of its own: v by more than x, which has h = 3.
+    close(most(&[("c", "x"), ("e", "v"), ("f", "v")]), 3.0_f64.ln() / 0.5);
+    // H = [−0.6 1; −2 1] has the eigenvalues 0.2 ± 1.17i, stable up to k = 0.286, but two rows of x make the trace of K H negative.
+    close(most(&[("g", "x"), ("i", "v")]), -(1.0_f64 - 2.0 * 0.2 / 1.4).ln() / 0.5);
+    assert_eq!(most(&[("g", "x"), ("h", "x"), ("i", "v")]), Some(0.0));
     // An output of two states of which one is corrected: h = 1.
     assert_eq!(most(&[("a", "x")]), None);
 }
