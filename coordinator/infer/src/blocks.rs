@@ -60,6 +60,8 @@ impl Cut {
 /// What the start of a recording says of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Start {
+    /// Time of the first row of the file.
+    pub(crate) first: f64,
     /// Sampling step.
     pub(crate) step: f64,
     /// Number of rows, guessed from the length of the file.
@@ -86,8 +88,12 @@ pub(crate) fn start(record: &InferRecord) -> Result<Start, InferError> {
     let mut values = vec![0.0; record.columns.len()];
     let mut times = Vec::new();
     let mut n_read = 0_u64;
+    let mut first = f64::NAN;
     while times.len() < FIRST {
         let Some(Row { time, .. }) = rows.next(&mut values)? else { break };
+        if n_read == 0 {
+            first = time;
+        }
         n_read += 1;
         if time >= record.span[0] && time <= record.span[1] {
             times.push(time);
@@ -99,7 +105,7 @@ pub(crate) fn start(record: &InferRecord) -> Result<Start, InferError> {
     };
     let per_row = (rows.n_byte() - before) as f64 / n_read as f64;
     let per_row = per_row.max(1.0);
-    Ok(Start { step, n_row: length(record) as f64 / per_row, per_row })
+    Ok(Start { first, step, n_row: length(record) as f64 / per_row, per_row })
 }
 
 /// Bytes of a recording's file.

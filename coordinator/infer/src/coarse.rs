@@ -51,25 +51,29 @@ pub(crate) fn coarse(
     }
     let structure = &asked.question.structure;
     let pieces = pieces(asked, cut, at).ok()?;
-    let errors = |n_step| step_errors(&pieces, n_step, fit, structure, &answer.posterior, LEVEL);
+    let errors = |n_level| step_errors(&pieces, n_level, fit, structure, &answer.posterior, LEVEL);
     match errors(3) {
-        Ok(moved) => (!moved.is_empty()).then_some(Coarse::Moved(moved)),
-        // Pieces that do not compare say nothing of the step; a longer one without a fit does.
-        Err(InferenceError::Shape { .. } | InferenceError::Incompatible { .. }) => None,
-        Err(_) => errors(2).map_or_else(
-            |_| {
-                let rates = step_in_rates(sums, &answer.posterior);
-                (rates > RATES).then_some(Coarse::Fast(rates))
-            },
-            |moving| (!moving.is_empty()).then_some(Coarse::Moving(moving)),
-        ),
+        Ok(moved) => return (!moved.is_empty()).then_some(Coarse::Moved(moved)),
+        Err(InferenceError::Shape { .. }) => return None,
+        // A longer step without a fit, or with one that holds other coefficients, may still be too long to be compared.
+        Err(_) => {}
+    }
+    match errors(2) {
+        Ok(moving) => (!moving.is_empty()).then_some(Coarse::Moving(moving)),
+        // Pieces that do not compare say nothing of the step.
+        Err(InferenceError::Incompatible { .. }) => None,
+        Err(_) => {
+            let rates = step_in_rates(sums, &answer.posterior);
+            (rates > RATES).then_some(Coarse::Fast(rates))
+        }
     }
 }
 
 /// Sums at h, 2h and 4h of the first pieces of the first recording.
 fn pieces(asked: &Asked<'_>, cut: Cut, at: Start) -> Result<Vec<[Sums; 3]>, InferError> {
     let Some(record) = asked.choice.records.first() else { return Ok(Vec::new()) };
-    let n_row = at.n_row.min((record.span[1] - record.span[0]) / at.step);
+    let [from, to] = [record.span[0].max(at.first), record.span[1].min(at.first + at.n_row * at.step)];
+    let n_row = ((to - from) / at.step).max(0.0);
     let n_step = ((n_row / PIECES as f64) as usize).clamp(LEAST, MOST);
     let cut = Cut { bytes: None, block: n_step, ahead: 0, ..cut };
     let mut blocks = Blocks::new((0, record), open(record)?, cut);

@@ -28,13 +28,13 @@ pub struct StepError {
 }
 
 /// The coefficients that the error of the step moves out of their intervals of probability `level`, and surely so. `pieces` are sums at h, 2h
-/// and 4h of parts of the recording, of which the first `n_step` are compared, three or two; `posterior` is that of all of it.
+/// and 4h of parts of the recording, of which the first `n_level` are compared, three or two; `posterior` is that of all of it.
 ///
 /// # Errors
 /// `Shape` for fewer than two pieces or other than two or three steps; as [`Fit::posterior`] and [`extrapolate`] at any of them.
 pub fn step_errors(
     pieces: &[[Sums; 3]],
-    n_step: usize,
+    n_level: usize,
     fit: &Fit,
     structure: &Structure,
     posterior: &Posterior,
@@ -44,12 +44,12 @@ pub fn step_errors(
     if n < 2 {
         return Err(InferenceError::Shape { what: "pieces of a recording", expected: 2, got: n });
     }
-    if !(2..=3).contains(&n_step) {
-        return Err(InferenceError::Shape { what: "steps to compare", expected: 3, got: n_step });
+    if !(2..=3).contains(&n_level) {
+        return Err(InferenceError::Shape { what: "steps to compare", expected: 3, got: n_level });
     }
     let at = |k: usize| fit.posterior(&merged(pieces, k, None)?, structure);
-    let levels = (0..n_step).map(at).collect::<Result<Vec<_>, _>>()?;
-    let found = extrapolate(&levels, (n_step == 2).then_some(Strength::Weak))?;
+    let levels = (0..n_level).map(at).collect::<Result<Vec<_>, _>>()?;
+    let found = extrapolate(&levels, (n_level == 2).then_some(Strength::Weak))?;
     let mut without = Vec::with_capacity(n);
     for left_out in 0..n {
         let known = |k: usize| {
