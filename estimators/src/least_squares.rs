@@ -50,10 +50,13 @@ pub struct LeastSquares {
 }
 
 impl LeastSquares {
-    /// A fit from a point that was not run yet. It ends when no step promises a fall of the cost (chi-square plus prior) above
+    /// A fit from a point that was not run yet, or the nearest one within the bounds. It ends when no step promises a fall of the cost (chi-square plus prior) above
     /// `tolerance`, in units of the mean square of the residuals where that is above one, and what the digits of the cost resolve, or
     /// after `trials` steps.
-    pub fn new(start: DVector<f64>, prior: Scaled, tolerance: f64, trials: usize) -> Self {
+    pub fn new(mut start: DVector<f64>, prior: Scaled, tolerance: f64, trials: usize) -> Self {
+        for (value, [lo, hi]) in start.iter_mut().zip(&prior.bounds) {
+            *value = value.max(*lo).min(*hi);
+        }
         let need = Need::Residual(start.clone());
         Self {
             prior,

@@ -44,6 +44,7 @@ impl LeastSquares {
         };
         let mut free: Vec<usize> = (0..p).filter(|j| moves(*j) && !held(*j) && curvature[*j] > 0.0).collect();
         let mut stopped = DVector::zeros(p);
+        let mut is_whole = true;
         let step = loop {
             let left = &self.residual - self.jacobian.times(&stopped);
             let solved = damped::solve(self, &free, &left, &pull, &curvature)?;
@@ -52,7 +53,11 @@ impl LeastSquares {
             for (k, j) in free.iter().enumerate() {
                 step[*j] = solved[k] * shrink;
             }
-            let Some((k, end)) = self.first_stop(&free, &step) else { break step };
+            let Some((k, end)) = self.first_stop(&free, &step) else {
+                is_whole &= shrink >= 1.0;
+                break step;
+            };
+            is_whole &= end > self.shortest(free[k]);
             stopped[free.remove(k)] = end;
         };
         let promise = |step: &DVector<f64>| {
@@ -67,11 +72,12 @@ impl LeastSquares {
                 break;
             }
             step *= 0.5;
+            is_whole = false;
             predicted = promise(&step);
         }
         self.predicted = predicted;
         self.length = curvature.component_mul(&step).dot(&step).sqrt();
-        self.is_whole = self.length < damped::USED * self.radius && step.amax() < LONGEST;
+        self.is_whole = is_whole && self.length < damped::USED * self.radius;
         Some(step)
     }
 
@@ -89,12 +95,17 @@ impl LeastSquares {
         first
     }
 
+    /// The step of a component of exponential growth that leaves no more than it must of the quantity; of others there is none.
+    fn shortest(&self, j: usize) -> f64 {
+        (LEFT - 1.0) / self.prior.growth[j]
+    }
+
     /// Shortest and longest step of a component.
     fn ends(&self, j: usize) -> [f64; 2] {
         let ([lo, hi], growth, z) = (self.prior.bounds[j], self.prior.growth[j], self.z[j]);
         if growth > 0.0 {
             let to = |end: f64| (growth * (end - z)).exp_m1() / growth;
-            [to(lo).max((LEFT - 1.0) / growth), to(hi)]
+            [to(lo).max(self.shortest(j)), to(hi)]
         } else {
             [lo - z, hi - z]
         }

@@ -59,6 +59,35 @@ fn a_prior_far_from_what_the_data_want_of_a_growing_quantity_is_met_on_the_way()
 }
 
 #[test]
+fn a_fit_begins_within_the_bounds() {
+    let bounded = Scaled { bounds: vec![[0.0, 1.0], [f64::NEG_INFINITY, f64::INFINITY]], ..flat(2) };
+    let fit = LeastSquares::new(DVector::from_vec(vec![3.0, -7.0]), bounded, 1e-6, 10);
+    assert_eq!(fit.need(), &Need::Residual(DVector::from_vec(vec![1.0, -7.0])));
+}
+
+#[test]
+fn a_quantity_that_goes_as_far_down_as_a_step_may_is_not_held_to_have_arrived() {
+    // One residual of 20 c, c = exp(z), beside ten thousand of 100: in units of their mean square the tolerance is 200, and a step to a third
+    // of c promises less from c = 1/3 on.
+    let scaled = Scaled { growth: DVector::from_element(1, 1.0), ..flat(1) };
+    let of = |z: f64| DVector::from_fn(10_001, |i, _| if i == 0 { -20.0 * z.exp() } else { 100.0 });
+    let mut fit = LeastSquares::new(DVector::zeros(1), scaled, 0.02, 100);
+    let end = loop {
+        match fit.need().clone() {
+            Need::Residual(z) => fit.give_residual(Some(of(z[0]))),
+            Need::Jacobian(z) => {
+                let slope = |i: usize, _| if i == 0 { 20.0 * z[0].exp() } else { 0.0 };
+                fit.give_jacobian(Some(DMatrix::from_fn(10_001, 1, slope).into()));
+            }
+            Need::Nothing(end) => break end,
+        }
+    };
+    assert_eq!(end, End::Converged);
+    // It stops where a step promises no more than 1e-8 of the cost, which is 1.
+    assert!(20.0 * fit.best().0[0].exp() < 1.1, "{}", fit.best().0);
+}
+
+#[test]
 fn a_step_that_one_bound_cuts_off_still_leads_downhill() {
     // Two columns that are nearly one, whose free minimum lies at (-5, 5.2): cut off at zero, the step to it would lead uphill.
     let rows = DMatrix::from_row_slice(2, 2, &[100.0, 100.0, 1.0, -1.0]);
