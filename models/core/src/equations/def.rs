@@ -62,6 +62,8 @@ impl EquationsDef {
         let has = |e: &Expression, name: &str| e.names().iter().any(|(known, _)| known == name);
         let elsewhere = self.states.iter().map(|state| &state.initial);
         let elsewhere = elsewhere.chain(self.outputs.iter().map(|output| &output.value));
+        let noise = self.states.iter().flat_map(|state| state.noise.iter().map(|(_, amplitude)| amplitude));
+        let elsewhere = elsewhere.chain(noise);
         let elsewhere: Vec<Expression> = elsewhere.filter_map(parsed).collect();
         let rates = self.states.iter().flat_map(|state| state.rate.iter().map(|(_, text)| text));
         let rates: Vec<Expression> = rates.filter_map(parsed).collect();
@@ -211,10 +213,14 @@ mod tests {
             rate: vec![(name.to_owned(), rate.to_owned())],
             ..StateDef::default()
         };
-        let states = vec![state("x", "x0", "v"), state("v", "0", "-k*x - c*abs(v)*v/m - x^n + g*s")];
+        let shaken = vec![("wind".to_owned(), "0.1*w".to_owned())];
+        let states = vec![
+            state("x", "x0", "v"),
+            StateDef { noise: shaken, ..state("v", "0", "-k*x - c*abs(v)*v/m - x^n + g*s + w") },
+        ];
         let outputs =
             vec![OutputDef { name: "y".to_owned(), value: "s*x".to_owned(), ..OutputDef::default() }];
         let def = EquationsDef { states, outputs, ..EquationsDef::default() };
-        assert_eq!(def.linear_in(&["k", "c", "m", "n", "g", "s", "x0", "absent"]), ["k", "c", "g"]);
+        assert_eq!(def.linear_in(&["k", "c", "m", "n", "g", "s", "w", "x0", "absent"]), ["k", "c", "g"]);
     }
 }
