@@ -95,7 +95,8 @@ impl Display {
     /// One analysis more.
     pub(crate) fn step(&self, at: &Progress) {
         let is_edge = at.step == 1 || at.step == at.steps;
-        self.tell(Told::Step(at.clone()), |_| is_edge);
+        let is_another = |before: Option<&Told>| before.is_none_or(|before| before.stage() != at.stage);
+        self.tell(Told::Step(at.clone()), |before| is_edge || at.is_after_fit() && is_another(before));
     }
 
     /// A command goes on whose work has stages: each is told once, and where it stands now and then.

@@ -7,7 +7,7 @@
 
 use std::collections::VecDeque;
 
-use starlings_study::{Takes, Work};
+use starlings_study::{Part, Takes, Work};
 
 /// Looks that are kept.
 const KEPT: usize = 256;
@@ -61,7 +61,7 @@ impl Pace {
         let gains: Vec<f64> =
             done.iter().zip(&last.done).map(|(now, before)| (now - before).max(0.0)).collect();
         let expected: Vec<f64> =
-            gains.iter().zip(&rates).map(|(gain, rate)| gain * rate.unwrap_or(1.0)).collect();
+            gains.iter().enumerate().map(|(k, gain)| gain * weight(work.parts[k].takes, rates[k])).collect();
         let all: f64 = expected.iter().sum();
         if all <= 0.0 {
             return;
@@ -117,7 +117,7 @@ impl Pace {
         let left: Vec<f64> = work.parts.iter().map(|part| part.left).collect();
         let rest = of_all(rates, &left)?;
         let foreseen = rest * passed / made - (now_s - last.at_s);
-        // As if as much were done just now as between two looks before, or as the next batch holds.
+        // As if as much were done just now as between two looks before.
         let steps = self.looks.iter().skip(from).zip(self.looks.iter().skip(from + 1));
         let step = steps.filter_map(|(a, b)| took(a, b)).fold(0.0, f64::max).min(rest);
         let at_least = (rest - step) * (now_s - before.at_s) / (made + step);
@@ -137,15 +137,21 @@ fn of_all(rates: &Rates, units: &[f64]) -> Option<f64> {
     rates.iter().zip(units).map(known).sum()
 }
 
+/// What a unit weighs beside others: the seconds that it takes, or before they are known what it should take of those of a run.
+fn weight(takes: Takes, rate: Option<f64>) -> f64 {
+    match (rate, takes) {
+        (Some(rate), _) => rate,
+        (None, Takes::Runs(weight)) => weight,
+        (None, Takes::Seconds(_)) => 0.0,
+    }
+}
+
 /// The share that is done; before anything tells how long runs take that of the runs alone.
 fn share(work: &Work, rates: &Rates) -> Option<f64> {
-    let weight = |(k, takes): (usize, Takes)| match (rates[k], takes) {
-        (Some(rate), _) if rates.iter().all(Option::is_some) => rate,
-        (_, Takes::Runs(weight)) => weight,
-        (_, Takes::Seconds(_)) => 0.0,
-    };
-    let weights: Vec<f64> = work.parts.iter().map(|part| part.takes).enumerate().map(weight).collect();
-    let of = |units: fn(&starlings_study::Part) -> f64| {
+    let known = rates.iter().all(Option::is_some);
+    let weigh = |(part, rate): (&Part, &Option<f64>)| weight(part.takes, rate.filter(|_| known));
+    let weights: Vec<f64> = work.parts.iter().zip(rates).map(weigh).collect();
+    let of = |units: fn(&Part) -> f64| {
         work.parts.iter().zip(&weights).map(|(part, weight)| weight * units(part)).sum::<f64>()
     };
     let (done, left) = (of(|part| part.done), of(|part| part.left));
@@ -154,8 +160,6 @@ fn share(work: &Work, rates: &Rates) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use starlings_study::Part;
-
     use super::*;
 
     /// Work of one kind, of which so much is done, ten in all and twenty more.

@@ -7,6 +7,7 @@ use starlings_models::Window;
 
 use super::settling::More;
 use super::{Part, Takes, Work};
+use crate::fit::LIMIT;
 use crate::{Study, constants};
 
 /// Passes that are expected where they go on until the estimate has settled, until their moves tell more.
@@ -35,6 +36,8 @@ pub(crate) struct WorkPlan {
     before: Vec<f64>,
     particles: f64,
     passes: Option<usize>,
+    /// Passes of a filter or iterations of a batch fit, at most.
+    most: usize,
     is_filter: bool,
     /// Of the runs after the fit, in their order.
     last: Vec<f64>,
@@ -74,6 +77,7 @@ impl WorkPlan {
             before,
             particles: n_particle as f64,
             passes: study.passes(),
+            most: if is_filter { LIMIT } else { study.estimator.max_iterations },
             is_filter,
             last: vec![whole, observer, constants, residuals, predicted],
             own_s: VALUE_S.mul_add((values * study.parameters.len()) as f64, FILES_S),
@@ -91,6 +95,7 @@ impl WorkPlan {
         let of_pass = self.particles * self.of_pass();
         if !self.is_filter {
             let left = expected(more).unwrap_or_else(|| ITERATIONS.saturating_sub(step).max(1));
+            let left = left.min(self.most.saturating_sub(step));
             let fit = [step as f64 * of_pass, left as f64 * of_pass];
             return self.work([[0.0; 2], fit], 0, if left > 0 { of_pass } else { 0.0 }, RECORDS);
         }
@@ -99,7 +104,9 @@ impl WorkPlan {
         let of_this = self.particles * upto(step).unwrap_or(0.0);
         let later = match self.passes {
             Some(passes) => passes.saturating_sub(pass + 1),
-            None => expected(more).unwrap_or_else(|| PASSES.saturating_sub(pass + 1)),
+            None => expected(more)
+                .unwrap_or_else(|| PASSES.saturating_sub(pass + 1))
+                .min(self.most.saturating_sub(pass + 1)),
         } as f64;
         let windows = [of_pass.mul_add(pass as f64, of_this), of_pass.mul_add(later + 1.0, -of_this)];
         let searches = [pass as f64 * search, later * search];
@@ -155,6 +162,7 @@ mod tests {
             before: vec![0.0, 1.0, 3.0],
             particles: 4.0,
             passes,
+            most: 12,
             is_filter: true,
             last: vec![3.0, 0.0, 6.0, 6.0],
             own_s: 1.0,
@@ -198,6 +206,10 @@ mod tests {
         assert!(is_close(left(0, More::Usual), 36.0), "three passes more");
         assert!(is_close(left(1, More::Expected(1)), 12.0), "the moves are short");
         assert!(is_close(left(5, More::Usual), 0.0), "more passes than are usual");
+        assert!(
+            is_close(left(9, More::Expected(50)), 24.0),
+            "two are left of the twelve that there are at most"
+        );
         assert!(plan.at(1, 1, More::Usual).ends && !plan.at(1, 1, More::Unknown).ends);
         let search = plan.at(0, 2, More::Expected(2));
         assert!(search.at == RECORDS && is_close(search.next, 6.0), "{search:?}");
@@ -212,5 +224,7 @@ mod tests {
         assert!(is_close(first.parts[RECORDS].left, 4.0 * 12.0 + 15.0), "{first:?}");
         let settled = plan.at(0, 3, More::Expected(0));
         assert!(is_close(settled.parts[RECORDS].left, 15.0) && is_close(settled.next, 0.0), "{settled:?}");
+        let slow = plan.at(0, 10, More::Expected(50));
+        assert!(is_close(slow.parts[RECORDS].left, 2.0 * 12.0 + 15.0), "two more may follow: {slow:?}");
     }
 }
