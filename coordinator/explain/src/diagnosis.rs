@@ -22,7 +22,7 @@ use crate::judge::search_result::SearchResult;
 use crate::judge::verdict::{Decision, Verdict, decide, limits};
 use crate::locate::{self, Track, UnknownInput};
 use crate::options::Options;
-use crate::refit::other_forms::{is_of_a_field, search_other_forms, sole_effect};
+use crate::refit::other_forms::{search_other_forms, sole_effect};
 use crate::refit::search::{first_kinds, search, search_further};
 use crate::run_cache::{Course, Point, RunCache};
 use crate::screen::candidates::candidates;
@@ -123,21 +123,20 @@ fn decide_further<'c>(
     }
     let forces = forces(cache, &found.base)?;
     if decision.verdict == Verdict::Unexplained && proposals::are_wanted(found.base.variant.base, options) {
-        let Proposals { candidates: made, considered } = made(found, candidates, tracks, &forces);
-        if !made.is_empty() {
-            found.looked_at = considered as f64 / made.len() as f64;
-            let all = proposed.get_or_init(|| candidates.iter().cloned().chain(made).collect());
+        let made = made(found, candidates, tracks, &forces);
+        if !made.candidates.is_empty() {
+            found.looked_at = made.looked_at();
+            let all = proposed.get_or_init(|| candidates.iter().cloned().chain(made.candidates).collect());
             search_further(cache, found, all, tracks, options, &[Kind::Proposal])?;
             cache.stage("verdict", "");
             decision = decide(cache, found, all)?;
         }
-    } else if let Some(named) = decision.best
+    } else if let Some(named) = decision.best.filter(|named| sole_effect(&found.judged[*named]).is_some())
         && proposals::are_wanted(found.base.variant.base, options)
     {
-        let Proposals { candidates: made, considered } =
-            in_place_of(found, named, candidates, tracks, &forces);
-        found.looked_at = considered as f64 / made.len().max(1) as f64;
-        let all = proposed.get_or_init(|| candidates.iter().cloned().chain(made).collect());
+        let made = in_place_of(found, named, candidates, tracks, &forces);
+        found.looked_at = made.looked_at();
+        let all = proposed.get_or_init(|| candidates.iter().cloned().chain(made.candidates).collect());
         if search_other_forms(cache, found, all, tracks, options, named)? {
             cache.stage("verdict", "");
             decision = decide(cache, found, all)?;
@@ -171,7 +170,7 @@ fn in_place_of(
 ) -> Proposals {
     let judged = &found.judged[named];
     let Some(effect) = sole_effect(judged) else { return Proposals::default() };
-    if !is_of_a_field(effect.candidate.kind) {
+    if !effect.candidate.kind.is_of_a_field() {
         return made(found, known, tracks, forces);
     }
     let (study, theta) = first_trained(found);

@@ -52,8 +52,14 @@ mod tests {
     #[test]
     fn the_page_lists_every_number_of_the_decision_and_of_the_race_with_its_value() {
         let of = Path::new(env!("CARGO_MANIFEST_DIR"));
-        let places =
-            ["judge", "refit/race.rs", "refit/other_forms.rs", "screen/proposals.rs", "screen/proposals"];
+        let places = [
+            "judge",
+            "refit/race.rs",
+            "refit/other_forms.rs",
+            "refit/replacements.rs",
+            "screen/proposals.rs",
+            "screen/proposals",
+        ];
         let mut code = BTreeSet::new();
         for place in places {
             numbers(&of.join("src").join(place), &format!("coordinator/explain/src/{place}"), &mut code);

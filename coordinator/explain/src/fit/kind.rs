@@ -42,6 +42,11 @@ impl Kind {
         matches!(self, Self::Generic | Self::Proposal)
     }
 
+    /// Whether it stands for a cause in the equation that it enters, as no error of an instrument does.
+    pub(crate) fn is_of_a_field(self) -> bool {
+        matches!(self, Self::Study | Self::Library)
+    }
+
     /// What the prior takes from the support of an effect of this kind, in χ².
     pub(crate) fn price(self) -> f64 {
         STEP * f64::from(self as u8)

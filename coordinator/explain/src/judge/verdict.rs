@@ -232,8 +232,9 @@ fn complexity(judged: &JudgedFit<'_>) -> usize {
     terms.filter_map(|add| size(&add.term)).map(|program| program.n_operations()).sum()
 }
 
-/// Candidates that were not refitted and whose influence cannot be told from that of the best. A form that stands for no cause has lost the
-/// race to the best: it is one where the part of the gain that their influences do not share is within the margin too.
+/// Candidates that were not refitted and whose influence cannot be told from that of the best. Of forms that stand for no cause, which are
+/// made by the dozen and of which the nearest were refitted, those where the part of the gain that the two do not share is within the margin
+/// too.
 fn twins(
     cache: &RunCache<'_>,
     found: &SearchResult<'_>,
@@ -259,9 +260,9 @@ fn twins(
         let candidate = &candidates[result.candidate];
         let name = vec![candidate.name().to_owned()];
         let allowed = result.allowed_gain(candidate.sign()) > 0.0;
-        let has_lost =
+        let is_told_apart =
             candidate.kind.is_of_no_field() && gain * (1.0 - alike * alike) > MARGIN * judged.inflation;
-        if !refitted && allowed && alike > ALIKE && !has_lost && !twins.contains(&name) {
+        if !refitted && allowed && alike > ALIKE && !is_told_apart && !twins.contains(&name) {
             twins.push(name);
         }
     }

@@ -15,7 +15,7 @@ use crate::judge::gates::JudgedFit;
 use crate::judge::search_result::SearchResult;
 use crate::locate::Track;
 use crate::options::Options;
-use crate::run_cache::RunCache;
+use crate::run_cache::{Course, RunCache};
 use crate::screen::screening_result::ScreeningResult;
 
 /// Kinds that describe a dependence and no cause.
@@ -24,11 +24,6 @@ const FORMS: &[Kind] = &[Kind::Generic, Kind::Proposal];
 const BAND: f64 = 12.0;
 /// ... and as a share of it: scores of the first order are off by as much.
 const FIRST_ORDER: f64 = 0.05;
-
-/// Whether an effect of this kind stands for a cause in the equation that it enters.
-pub(crate) fn is_of_a_field(kind: Kind) -> bool {
-    matches!(kind, Kind::Study | Kind::Library)
-}
 
 /// The effect of a variant of which there may be other forms: the only one, which takes no term's place and leaves nothing but noise. A form
 /// of no field is not named where more is left.
@@ -60,6 +55,7 @@ pub(crate) fn search_other_forms<'c>(
     let least = of_named - BAND * found.judged[named].inflation - FIRST_ORDER * of_named;
     let stage = format!("other forms of {}", effect.candidate.name());
     let mut searcher = Searcher { cache, candidates, tracks, cut_short: false, asked: false, tried: FORMS };
+    searcher.cache.foreseen.goes(Course::Open);
     searcher.cache.stage("screen", &stage);
     let screening = searcher.screen(&found.base, &points)?;
     let mut near = searcher.best_of_each(&screening);
@@ -86,11 +82,11 @@ pub(crate) fn search_other_forms<'c>(
 fn forms_of(found: &SearchResult<'_>, candidates: &[Candidate], named: &Candidate) -> Vec<(usize, usize)> {
     let adds_to = |quantity: &str| named.def.adds.iter().any(|add| add.to == quantity);
     let is_in_place =
-        |form: &Candidate| !is_of_a_field(named.kind) || form.def.adds.iter().all(|add| adds_to(&add.to));
+        |form: &Candidate| !named.kind.is_of_a_field() || form.def.adds.iter().all(|add| adds_to(&add.to));
     let is_scored = |index: usize| found.screening.iter().any(|h| h.candidate == index);
     let open = candidates
         .iter()
         .enumerate()
-        .filter(|(index, c)| FORMS.contains(&c.kind) && is_in_place(c) && !is_scored(*index));
+        .filter(|(index, c)| c.kind.is_of_no_field() && is_in_place(c) && !is_scored(*index));
     open.flat_map(|(index, c)| (0..c.points.len()).map(move |point| (index, point))).collect()
 }

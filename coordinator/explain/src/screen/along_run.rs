@@ -78,8 +78,8 @@ pub(super) fn along_run(
     term.each(times, steps, |name, step| of(name, record, step), Program::eval)
 }
 
-/// The derivative of a term of the model by one of its parameters, at these steps of a record; nothing where the term does not read it, or
-/// cannot be evaluated along the run.
+/// The derivative of a term of the model by one of its parameters, at these steps of a record: zero where the term does not read it, nothing
+/// where it does and cannot be evaluated along the run.
 pub(super) fn slope_along_run(
     reference: &ReferenceRun<'_>,
     term: &str,
@@ -87,10 +87,12 @@ pub(super) fn slope_along_run(
     record: usize,
     steps: &[usize],
 ) -> Option<Vec<f64>> {
+    if !Expression::parse(term).ok()?.names().iter().any(|(name, _)| name == parameter) {
+        return Some(vec![0.0; steps.len()]);
+    }
     let none = Candidate::new(EffectDef::default());
     let of = |name: &str, record: usize, step: usize| value(reference, &none, &[], name, record, step);
     let term = Term::new(term, |name| of(name, 0, 0).is_some())?;
-    term.names.iter().position(|name| name == parameter)?;
     let along: Vec<f64> = term.names.iter().map(|name| f64::from(u8::from(name == parameter))).collect();
     let direction = Direction { theta: &along, ..Direction::default() };
     let times = &reference.study.records[record].times;

@@ -38,6 +38,13 @@ pub(crate) struct Proposals {
     pub(crate) considered: usize,
 }
 
+impl Proposals {
+    /// Terms that were looked at for every one that was made; one where none was.
+    pub(crate) fn looked_at(&self) -> f64 {
+        (self.considered as f64 / self.candidates.len().max(1) as f64).max(1.0)
+    }
+}
+
 /// Whether a search may make terms of its own: no list limits it, and they were not left out.
 pub(crate) fn are_wanted(study: &Study, options: &Options) -> bool {
     let unlimited = options.only.is_empty() && matches!(study.explain.library, Library::All);

@@ -11,7 +11,7 @@ use super::influence::Influence;
 const ABSORBED: f64 = 0.05;
 /// ... and any candidate when it is less than this: an influence is a difference over a response of that share of the signal, and what
 /// is left of it below is the curvature of the response.
-const IMITATED: f64 = 3e-3;
+pub(crate) const IMITATED: f64 = 3e-3;
 
 /// The screening of a candidate at one point of its grid.
 #[derive(Clone, Debug)]

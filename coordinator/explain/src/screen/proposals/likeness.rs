@@ -10,6 +10,7 @@ use starlings_study::Record;
 use super::taken_up::slopes;
 use crate::fit::candidate::Candidate;
 use crate::screen::along_run::{ReferenceRun, along_run};
+use crate::screen::screening_result::IMITATED;
 
 /// Steps of the record that are looked at, at most.
 const STEPS: usize = 200;
@@ -20,7 +21,7 @@ pub(super) struct Likeness {
     steps: Vec<usize>,
     /// Orthonormal columns of what the parameters change there.
     taken_up: DMatrix<f64>,
-    /// The term less these, of length one; zero where they are all of it.
+    /// The term less these, of length one.
     own: DVector<f64>,
 }
 
@@ -46,12 +47,15 @@ impl Likeness {
     /// What of a term is its own beside these courses, and an orthonormal basis of them.
     fn of_courses(taken_up: &[Vec<f64>], term: Vec<f64>) -> Option<(DMatrix<f64>, DVector<f64>)> {
         let n = term.len();
-        let columns: Vec<DVector<f64>> = taken_up.iter().map(|c| DVector::from_column_slice(c)).collect();
-        let basis = if columns.is_empty() || n < columns.len() {
-            DMatrix::zeros(n, 0)
-        } else {
-            DMatrix::from_columns(&columns).qr().q()
-        };
+        // One after the other, so that a course which repeats those before it adds no direction.
+        let mut basis = DMatrix::zeros(n, 0);
+        for course in taken_up {
+            if let Some(further) = own(&basis, &DVector::from_column_slice(course)) {
+                let at = basis.ncols();
+                basis = basis.insert_column(at, 0.0);
+                basis.set_column(at, &further);
+            }
+        }
         let own = own(&basis, &DVector::from_vec(term))?;
         Some((basis, own))
     }
@@ -68,11 +72,11 @@ impl Likeness {
     }
 }
 
-/// A course less its part along an orthonormal basis, of length one; `None` where no number is left of it.
+/// A course less its part along an orthonormal basis, of length one; `None` where next to nothing is left of it, or no number.
 fn own(basis: &DMatrix<f64>, course: &DVector<f64>) -> Option<DVector<f64>> {
     let own = course - basis * basis.tr_mul(course);
     let size = own.norm();
-    (size > 0.0 && size.is_finite()).then(|| own / size)
+    (size > IMITATED * course.norm() && size.is_finite()).then(|| own / size)
 }
 
 #[cfg(test)]
@@ -98,6 +102,17 @@ mod tests {
             alike(|s| s.powi(3), |s| s.powi(3) + 40.0 * s) > 1.0 - 1e-9,
             "the parameter takes up the rest"
         );
+    }
+
+    #[test]
+    fn what_the_parameters_are_all_of_is_like_nothing_and_a_slope_that_stands_twice_counts_once() {
+        let swing: Vec<f64> = (0..100).map(|k| (0.37 * f64::from(k)).sin()).collect();
+        let cube: Vec<f64> = swing.iter().map(|s| s.powi(3)).collect();
+        let twice = [swing.clone(), swing.iter().map(|s| 3.0 * s).collect()];
+        let of = |taken_up: &[Vec<f64>], term: &[f64]| Likeness::of_courses(taken_up, term.to_vec());
+        assert_eq!(of(&twice[..1], &twice[1]), None, "in proportion to the swing");
+        let (once, twice) = (of(&twice[..1], &cube).unwrap(), of(&twice, &cube).unwrap());
+        assert_eq!((once.0.ncols(), &once.1), (twice.0.ncols(), &twice.1));
     }
 
     #[test]
