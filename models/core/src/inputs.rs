@@ -135,7 +135,7 @@ mod tests {
     fn window() -> Window {
         let flow = Signal { times: vec![0.0, 1.0, 3.0], values: vec![0.0, 10.0, 0.0] };
         let other = Signal { times: vec![0.5, 2.0], values: vec![1.0, 4.0] };
-        Window { start: 0.0, times: vec![4.0], observed: vec![], inputs: vec![flow, other], since: vec![] }
+        Window::free(0.0, vec![4.0], 0, vec![flow, other])
     }
 
     #[test]

@@ -46,15 +46,13 @@ pub fn block(record: u32, first: u64, n_step: usize, times: Vec<f64>, rows: Vec<
 pub fn file_block(record: u32, first: u64, n_step: usize, bytes: Bytes) -> Job {
     let Bytes { start, length, n_row } = bytes;
     // A window has a time; these rows have their own.
-    let window =
-        Window { start: 0.0, times: vec![0.0], observed: Vec::new(), inputs: Vec::new(), since: vec![] };
+    let window = Window::free(0.0, vec![0.0], 0, Vec::new());
     job(record, window, vec![n_step as f64, first as f64, start as f64, length as f64, n_row as f64])
 }
 
 /// The job of a block whose rows are those of a part of the record's file. The numbers of its rows are not known.
 pub fn file_part(record: u32, part: Part) -> Job {
-    let window =
-        Window { start: 0.0, times: vec![0.0], observed: Vec::new(), inputs: Vec::new(), since: vec![] };
+    let window = Window::free(0.0, vec![0.0], 0, Vec::new());
     job(record, window, vec![part.from as f64, part.to as f64, part.ahead as f64])
 }
 

@@ -98,7 +98,7 @@ fn used(file: &str, text: &str, spec: &Spec) -> Result<Used, (usize, String)> {
     let templates = Templates::parsed(&texts).map_err(|error| (error.line, error.reason))?;
     let empty = Signal { times: vec![0.0], values: vec![0.0] };
     let inputs = vec![empty; spec.inputs.len()];
-    let window = Window { start: 0.0, times: vec![0.0], observed: Vec::new(), inputs, since: vec![] };
+    let window = Window::free(0.0, vec![0.0], 0, inputs);
     let parameters = vec![0.0; spec.parameters.len()];
     let names = names(spec, &sample(&window, &parameters));
     let Ok(template) = templates.environment.get_template(file) else {
