@@ -42,6 +42,26 @@ fn steps_that_are_coarse_for_the_dynamics_are_told_with_the_remedy_and_fine_ones
 }
 
 #[test]
+fn steps_so_coarse_that_longer_ones_have_no_fit_are_told_by_what_is_left_to_compare() {
+    let data = recording(400_000, usize::MAX);
+    let of = |every_so: usize| infer(folder(STUDY, &every(every_so, &data)).path(), "out", "1");
+    // Of the rate 3 two tenths of whose time are a step: at 4 steps there is no fit, at 2 there is.
+    let found = of(10);
+    let said = coarse(&found);
+    assert!(said.len() == 1 && said[0].contains("four times the step has no fit"), "{found}");
+    assert!(said[0].contains("k by -") && said[0].contains("at least"), "{said:?}");
+    // At 2 steps there is none: a step is half the fastest time of the drift.
+    let found = of(15);
+    let said = coarse(&found);
+    assert!(said.len() == 1 && said[0].contains("a step is 0.5 times the fastest time"), "{found}");
+    // At the step itself there is none.
+    let dir = folder(STUDY, &every(40, &data));
+    let (code, _, stderr) = output(starlings().current_dir(dir.path()).args(["infer", "study.toml"]));
+    assert!(code == 2 && stderr.contains("each is too long for the dynamics"), "{code} {stderr}");
+    assert!(stderr.contains("record in shorter steps"), "{stderr}");
+}
+
+#[test]
 fn a_step_is_told_with_the_digits_of_the_times() {
     // The mean of these differences is 0.020000000000000018.
     let dir = folder(STUDY, &every(2, &recording(2_000, usize::MAX)));

@@ -121,7 +121,7 @@ fn remedy(error: &InferenceError) -> &'static str {
         }
         InferenceError::TooFew { .. } => " (record longer, ask for fewer coefficients, or give them priors)",
         InferenceError::NotSettled { .. } => {
-            " (give `[[parameters]]` priors, ask for fewer terms, or use rule = \"ito\")"
+            " (give `[[parameters]]` priors, ask for fewer terms, record in shorter steps, or use rule = \"ito\")"
         }
         InferenceError::DiffusionNotDefinite { .. } => {
             " (make the equation's state an input, use diffusion = \"diagonal\" where equations share their noise, or look for a column \

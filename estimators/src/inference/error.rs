@@ -133,7 +133,8 @@ pub enum InferenceError {
     },
     /// Coefficients and noise do not settle.
     #[error(
-        "coefficients and noise have not settled after {passes} passes: there are too few steps for so many terms"
+        "coefficients and noise have not settled after {passes} passes: there are too few steps for so many terms, or \
+         each is too long for the dynamics"
     )]
     NotSettled {
         /// Passes made.
