@@ -56,7 +56,13 @@ impl Told {
     /// In words; how much of it is done is for others to say.
     pub(super) fn in_words(&self) -> Standing {
         match self {
-            Self::Step(at) => step(at),
+            Self::Step(at) => Standing {
+                stage: at.title(),
+                says: at.says(),
+                runs: at.runs,
+                workers: at.workers,
+                ..Standing::default()
+            },
             Self::Stage(at) => Standing {
                 stage: at.name.to_owned(),
                 says: at.says.clone(),
@@ -83,14 +89,4 @@ impl Told {
             Self::Blocks(at) => log::blocks(at, standing, said),
         }
     }
-}
-
-fn step(at: &Progress) -> Standing {
-    let stage = match at.passes {
-        None => format!("pass {}", at.pass),
-        Some(passes) if passes > 1 => format!("pass {}/{passes}", at.pass),
-        Some(_) => at.stage.to_owned(),
-    };
-    let stage = if at.is_after_fit() { at.stage.to_owned() } else { stage };
-    Standing { stage, says: at.says(), runs: at.runs, workers: at.workers, ..Standing::default() }
 }

@@ -44,6 +44,7 @@ struct Staged {
 struct Analysed {
     stage: String,
     pass: usize,
+    passes: Option<usize>,
     step: usize,
     steps: usize,
     runs: u64,
@@ -135,9 +136,8 @@ impl Noted {
             Self::Explanation(staged) => return staged,
             Self::Run(analysed) => analysed,
         };
-        let is_last = progress::LAST.contains(&of.stage.as_str());
+        let name = progress::title(&of.stage, of.pass, of.passes);
         let says = progress::says(&of.stage, of.step, of.steps);
-        let name = if is_last { of.stage } else { format!("pass {}", of.pass) };
         Staged { name, says, runs: of.runs, workers: of.workers, work: of.work }
     }
 }

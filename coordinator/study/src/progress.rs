@@ -61,6 +61,16 @@ pub const PROGRESS: &str = "progress";
 /// the posterior; then what the coordinator does alone.
 pub const LAST: [&str; 6] = ["final run", "observer", "constants", "residuals", "predictions", FILES];
 
+/// A stage of a run, in a word or two: a pass where there are several or nobody knows how many.
+pub fn title(stage: &str, pass: usize, passes: Option<usize>) -> String {
+    match passes {
+        _ if LAST.contains(&stage) => stage.to_owned(),
+        None => format!("pass {pass}"),
+        Some(passes) if passes > 1 => format!("pass {pass}/{passes}"),
+        Some(_) => stage.to_owned(),
+    }
+}
+
 /// How far a stage of a run is, in a few words.
 pub fn says(stage: &str, step: usize, steps: usize) -> String {
     match stage {
@@ -82,6 +92,11 @@ impl Progress {
     /// Whether the fit is over.
     pub fn is_after_fit(&self) -> bool {
         LAST.contains(&self.stage)
+    }
+
+    /// Its stage, in a word or two.
+    pub fn title(&self) -> String {
+        title(self.stage, self.pass, self.passes)
     }
 
     /// How far its stage is, in a few words.
