@@ -3,6 +3,7 @@
 mod study_kit;
 
 use nalgebra::{DMatrix, DVector};
+use starlings_coordinator::study::identify::At;
 use study_kit::linear::{self, A, Answer, B, NOISE, START, assert_exact};
 use study_kit::{Case, csv, grid, normals, run_once};
 
@@ -161,6 +162,18 @@ fn what_cannot_walk_is_refused_with_the_remedy() {
     // Predictions begin at the start of a record, where the posterior of such a study says nothing.
     let predicted = walking("passes = 1", &one) + "[predict]\noutputs = [\"y\"]\n";
     assert!(told(&predicted).contains("and what is predicted begins at its start"), "{}", told(&predicted));
+}
+
+#[test]
+fn what_begins_at_the_start_of_a_record_is_refused_at_the_posterior_of_a_state_that_walks() {
+    let case = Case::new(
+        &walking("passes = 1", &linear::record("one", "line.csv", NOISE, "")),
+        &[("line.csv", linear::file(&grid(10, 0.1), &[0.3; 10]))],
+    );
+    let study = case.study();
+    At::Prior.centre(&study).unwrap();
+    let refused = At::Run(case.fresh()).centre(&study).unwrap_err().to_string();
+    assert!(refused.contains("what is identified begins at its start: remove `process`"), "{refused}");
 }
 
 #[test]

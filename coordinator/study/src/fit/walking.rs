@@ -82,7 +82,7 @@ impl Study {
     }
 
     /// Why `what`, which begins at the start of a record, cannot go on from the posterior of this study.
-    pub(crate) fn ends_elsewhere(&self, what: &str) -> Option<String> {
+    pub(crate) fn lacks_start(&self, what: &str) -> Option<String> {
         self.walks().then(|| {
             format!(
                 "the study lets a state walk, so that its posterior has the state at the end of the record, and {what} begins at its \

@@ -16,7 +16,7 @@ const FIXED: usize = 8;
 /// When the run is not finished, or its posterior is not that of this study.
 fn read(study: &Study, folder: &RunFolder) -> Result<Gaussian, StudyForecastError> {
     let shown = folder.path.display();
-    if let Some(message) = study.ends_elsewhere("a forecast") {
+    if let Some(message) = study.lacks_start("a forecast") {
         return Err(StudyForecastError::Request(message));
     }
     let Some(text) = folder.store.meta("posterior")? else {

@@ -43,7 +43,7 @@ impl At {
 }
 
 fn estimate(study: &Study, path: &Path) -> Result<Vec<f64>, IdentifyError> {
-    if let Some(message) = study.ends_elsewhere("what is identified") {
+    if let Some(message) = study.lacks_start("what is identified") {
         return Err(IdentifyError::Point(message));
     }
     let folder = RunFolder::open(path)?;
