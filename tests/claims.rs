@@ -100,10 +100,10 @@ fn text_of_test(target: &str, name: &str) -> String {
 
 /// A text without comments, whose numbers nothing holds.
 fn code(text: &str) -> String {
-    let of_line = |line: &str| match line.find("//") {
+    let of_line = |line: &str| {
         // `http://` is no comment.
-        Some(at) if !line[..at].ends_with(':') => format!("{}\n", &line[..at]),
-        _ => format!("{line}\n"),
+        let comment = line.match_indices("//").map(|(at, _)| at).find(|at| !line[..*at].ends_with(':'));
+        format!("{}\n", &line[..comment.unwrap_or(line.len())])
     };
     text.lines().map(of_line).collect::<Vec<_>>().concat()
 }
