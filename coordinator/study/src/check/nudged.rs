@@ -38,11 +38,13 @@ fn limit(study: &Study, def: &ObserverDef) -> Result<Option<(f64, String, f64)>,
     let medians = study.theta_for(0, posterior::prior(study).mean.as_slice());
     let (model, spec) = (study.setup.model()?, study.setup.spec()?);
     let (theta, _) = start(&study.setup, &*model, &medians)?;
-    // As it works in the fit, where held-out channels are never seen; rows are those of all outputs.
-    let outputs = fitted(&study.setup, &study.records);
-    let wiring = Wiring { spec: &spec, outputs: &outputs, model: &*model, theta: &theta, native: NATIVE };
-    let observer = observer::build(&def.alone(), wiring)?;
-    let rows = observer::build(&def.alone(), Wiring { outputs: &study.setup.outputs, ..wiring })?.reads();
+    let fitted = fitted(&study.setup, &study.records);
+    let of = |outputs: &[String]| {
+        let wiring = Wiring { spec: &spec, outputs, model: &*model, theta: &theta, native: NATIVE };
+        observer::build(&def.alone(), wiring)
+    };
+    // As it works in the fit, where held-out channels are never seen; records have rows of all outputs.
+    let (observer, rows) = (of(&fitted)?, of(&study.setup.outputs)?.reads());
     let trained = study.records.iter().filter(|record| record.is_trained());
     let spacings = trained.filter_map(|record| Some((spacing(record, &rows)?, record.name.clone())));
     let Some((dt, record)) = spacings.max_by(|a, b| a.0.total_cmp(&b.0)) else { return Ok(None) };
