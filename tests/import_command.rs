@@ -227,6 +227,9 @@ fn a_carotid_and_an_iliac_bifurcation_carry_the_waves_of_openbf() {
     }
 }
 
+/// A vessel apart from the others.
+const SECOND_INLET: &str = "network:\n  - {label: other, sn: 7, tn: 8, L: 0.1, E: 400.0e3, R0: 9.0e-3, h0: 0.8e-3, gamma_profile: 9}";
+
 #[test]
 fn an_aorta_of_openbf_runs_and_what_the_model_lacks_is_named() {
     let folder = TempDir::new().unwrap();
@@ -247,7 +250,8 @@ fn an_aorta_of_openbf_runs_and_what_the_model_lacks_is_named() {
         ("gamma_profile: 9", "colour: red", "unknown field `colour`"),
         ("E: 400.0e3", "E: -1.0", "E is -1"),
         ("E: 400.0e3", "E: stiff", "line 17"),
-        ("tn: 2", "tn: 1", "the flow enters at exactly one"),
+        ("tn: 2", "tn: 1", "none where the flow enters"),
+        ("network:", SECOND_INLET, "nodes 1 and 7 are only starts of vessels: the file names one inflow"),
         ("uta_inlet.dat", "none.dat", "none.dat cannot be read"),
     ];
     for (from, to, words) in cases {

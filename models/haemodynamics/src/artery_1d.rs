@@ -9,7 +9,10 @@ mod checks;
 mod layout;
 mod network;
 mod node;
+mod pressures;
 mod quantities;
+mod shear;
+mod stenosis;
 mod step;
 mod transport;
 mod vessels;
@@ -54,6 +57,8 @@ enum Fault {
     Node { name: String },
     /// The pressures of all nodes together have no solution.
     Network,
+    /// A stenosis lets nothing through.
+    Closed { name: String, severity: f64 },
 }
 
 impl Fault {
@@ -64,6 +69,11 @@ impl Fault {
                 format!("the flow reaches the speed of its waves in cell {cell} at t = {t}")
             }
             Self::Network => format!("no pressures of its nodes fit the network at t = {t}"),
+            Self::Closed { name, severity } => format!(
+                "the stenosis `{name}` has a severity of {severity}: give a part of the area from 0 to {}, as by a prior \
+                 `logit(0, {0})`; end the vessel in an outlet where nothing passes",
+                stenosis::MOST_SEVERE
+            ),
             Self::Node { name } => {
                 format!("no flow below the speed of its waves fits the node `{name}` at t = {t}")
             }
@@ -101,9 +111,10 @@ impl Artery1d {
     ) -> Result<Volumes, ModelFailure> {
         let finite = |value: &f64| value.is_finite();
         if !(segment.u0.iter().all(finite) && segment.slope.iter().all(finite)) {
-            return Err(ModelFailure::NotFinite { what: "input `flow`".to_owned(), time: segment.t0 });
+            return Err(ModelFailure::NotFinite { what: self.input_not_finite(segment), time: segment.t0 });
         }
         let vessels = Vessels::new(&self.network, theta);
+        vessels.open().map_err(|fault| fault.at(segment.t0))?;
         let (mut work, mut volumes) = (Work::new(&vessels), Volumes::default());
         let (mut t, mut n_step) = (segment.t0, 0);
         while t < segment.t1 {
@@ -116,10 +127,7 @@ impl Artery1d {
                 return Err(ModelFailure::NotFinite { what: "the speed of waves".to_owned(), time: t });
             }
             let next = segment.next_time(t, longest)?;
-            let inflow = Inflow {
-                start: segment.u0[0] + segment.slope[0] * (t - segment.t0),
-                slope: segment.slope[0],
-            };
+            let inflow = Inflow { start: segment.u0, slope: segment.slope, since: t - segment.t0 };
             vessels.step(next - t, inflow, x, &mut work, &mut volumes).map_err(|fault| fault.at(t))?;
             t = next;
             n_step += 1;
@@ -128,6 +136,13 @@ impl Artery1d {
             }
         }
         Ok(volumes)
+    }
+
+    /// The input that is not finite.
+    fn input_not_finite(&self, segment: Segment<'_>) -> String {
+        let finite = |(u, slope): (&f64, &f64)| u.is_finite() && slope.is_finite();
+        let found = segment.u0.iter().zip(segment.slope).position(|pair| !finite(pair));
+        format!("input `{}`", Spec::component(&self.spec.inputs, found.unwrap_or_default()))
     }
 
     /// Volume in cm³ that the vessels hold in a state.
@@ -150,12 +165,13 @@ impl Model for Artery1d {
             *area = ring.area(vessels.p_start - vessels.p_ext);
         }
         x[n..2 * n].fill(0.0);
-        x[2 * n..].fill(vessels.p_start);
+        x[2 * n..vessels.narrowed].fill(vessels.p_start);
+        x[vessels.narrowed..].fill(0.0);
     }
 
     fn rhs(&self, _t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, dx: &mut [f64]) {
         let vessels = Vessels::new(&self.network, theta);
-        if vessels.rate(u.value[0], x, &mut Work::new(&vessels), dx).is_err() {
+        if vessels.rate(u.value, x, &mut Work::new(&vessels), dx).is_err() {
             dx.fill(f64::NAN);
         }
     }
@@ -164,7 +180,7 @@ impl Model for Artery1d {
         let vessels = Vessels::new(&self.network, theta);
         let (n, mut work) = (self.network.n_cell, Work::new(&vessels));
         let mut rate = vec![0.0; x.len()];
-        if vessels.rate(u.value[0], x, &mut work, &mut rate).is_err() {
+        if vessels.rate(u.value, x, &mut work, &mut rate).is_err() {
             return y.fill(f64::NAN);
         }
         let (y, hoop) = y.split_at_mut(self.spec.n_output() - 2 * n);
@@ -180,10 +196,18 @@ impl Model for Artery1d {
             }
         }
         y[2 * n..3 * n].copy_from_slice(&x[n..2 * n]);
-        y[3 * n] = work.faces.node[self.network.inlet];
-        for (&node, y) in self.network.outlets.iter().zip(y[3 * n + 1..].chunks_mut(2)) {
+        let (inlets, outlets) = y[3 * n..].split_at_mut(self.network.inlets.len());
+        for (&node, y) in self.network.inlets.iter().zip(inlets) {
+            *y = work.faces.node[node];
+        }
+        let (outlets, drops) = outlets.split_at_mut(2 * self.network.outlets.len());
+        for (&node, y) in self.network.outlets.iter().zip(outlets.chunks_mut(2)) {
             y[0] = work.faces.node[node];
             y[1] = vessels.outflow(node, &work.faces);
+        }
+        for (narrowing, y) in self.network.narrowings.iter().zip(drops) {
+            let [before, after] = narrowing.nodes.map(|node| work.faces.node[node]);
+            *y = before - after;
         }
     }
 

@@ -208,7 +208,7 @@ fn a_layout_that_makes_no_network_is_refused_with_its_place_and_a_remedy() {
         ("/segments/0/cells", serde_json::json!(10_000_000_000_u64), "segments[0].cells", "at most 10000"),
         ("/segments/1/regions", serde_json::json!(1000), "segments[1].regions", "1001 regions up to here"),
         ("/segments/0/colour", serde_json::json!("red"), "segments[0].colour", "unknown field"),
-        ("/nodes/0/kind", serde_json::json!("rcr"), "nodes", "exactly one node of kind \"inlet\""),
+        ("/nodes/0/kind", serde_json::json!("rcr"), "nodes", "no inlet: list a node of kind \"inlet\""),
         ("/nodes/1/kind", serde_json::json!("junction"), "nodes", "no outlet"),
         ("/nodes/1/kind", serde_json::json!("pump"), "nodes[1].kind", "unknown variant"),
         ("/nodes/1/name", serde_json::json!("heart"), "nodes[1].name", "two nodes"),

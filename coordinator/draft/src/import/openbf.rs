@@ -184,9 +184,11 @@ fn ends(vessels: &[Vessel]) -> Result<(i64, BTreeSet<i64>), String> {
     }
     match inlets[..] {
         [inlet] => Ok((inlet, outlets)),
-        _ => {
-            Err(format!("{} nodes are only starts of vessels: the flow enters at exactly one", inlets.len()))
-        }
+        [] => Err("no node is only the start of vessels: there is none where the flow enters".to_owned()),
+        [first, second, ..] => Err(format!(
+            "nodes {first} and {second} are only starts of vessels: the file names one inflow, and does not say what enters \
+             at another; end the vessel from node {second} elsewhere, or give both flows in a study of `artery-1d`"
+        )),
     }
 }
 

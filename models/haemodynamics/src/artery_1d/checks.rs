@@ -7,7 +7,7 @@ use std::collections::HashSet;
 use starlings_models_core::SetupError;
 use starlings_models_core::layout::fault;
 
-use super::layout::{Segment, StiffnessParameter, stiffness_parameter};
+use super::layout::{Friction, NodeEntry, NodeKind, Segment, StiffnessParameter, stiffness_parameter};
 use crate::MOST_CELLS;
 
 /// Regions of all vessels together at most: the pressures of their ends are one full system of equations in every step.
@@ -33,6 +33,27 @@ fn wall(path: &str, segment: &Segment) -> Result<(), SetupError> {
         }
     }
     Ok(())
+}
+
+/// Length in cm of a stenosis, where node `i` is one.
+///
+/// # Errors
+/// When it is none above zero, or another kind of node has one.
+pub(super) fn stenosis(i: usize, entry: &NodeEntry) -> Result<Option<f64>, SetupError> {
+    let path = format!("nodes[{i}].length");
+    match (entry.kind, entry.length) {
+        (NodeKind::Stenosis, Some(length)) if length > 0.0 && length.is_finite() => Ok(Some(length)),
+        (NodeKind::Stenosis, Some(length)) => {
+            Err(fault(&path, format!("length is {length}: give a number of cm above zero")))
+        }
+        (NodeKind::Stenosis, None) => {
+            Err(fault(&path, format!("`{}` has no length: give that of the stenosis in cm", entry.name)))
+        }
+        (_, Some(_)) => {
+            Err(fault(&path, format!("`{}` is no stenosis: only a stenosis has a length", entry.name)))
+        }
+        (_, None) => Ok(None),
+    }
 }
 
 /// Refuses what no vessel can be, too many cells, and vessels whose parameters would share a name.
@@ -65,6 +86,14 @@ pub(super) fn segments(segments: &[Segment]) -> Result<(), SetupError> {
         if !(segment.profile >= 2.0 && segment.profile.is_finite()) {
             let message =
                 format!("profile is {}: give 2 for a parabola, more for a flatter profile", segment.profile);
+            return Err(fault(&path("profile"), message));
+        }
+        if segment.friction == Friction::Womersley && segment.profile > 2.0 {
+            let message = format!(
+                "profile is {}: the profile of friction = \"womersley\" follows from the flow, and is a parabola when that is \
+                 steady; leave one of the two out",
+                segment.profile
+            );
             return Err(fault(&path("profile"), message));
         }
         let (cells, regions) = (segment.cells, segment.regions);

@@ -10,7 +10,7 @@ use serde::Deserialize;
 pub struct Layout {
     /// The vessels, in the order in which their cells stand in states and outputs.
     pub segments: Vec<Segment>,
-    /// The inlet and the outlets; a node where vessels join need not be listed.
+    /// The inlets and the outlets; a node where vessels join need not be listed.
     pub nodes: Vec<NodeEntry>,
 }
 
@@ -40,12 +40,26 @@ pub struct Segment {
     /// Hunter 2002): 2 for a parabola, more for a flatter one.
     #[serde(default = "parabola")]
     pub profile: f64,
+    /// What resists the flow.
+    #[serde(default)]
+    pub friction: Friction,
     /// Number of cells.
     #[serde(default = "twenty")]
     pub cells: usize,
     /// Number of equally long regions, each with a stiffness of its own.
     #[serde(default = "one")]
     pub regions: usize,
+}
+
+/// How the blood rubs at the wall.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Friction {
+    /// As in a steady flow with the profile of the segment.
+    #[default]
+    Steady,
+    /// As in an unsteady laminar flow (Womersley 1955; Zielke 1968): the wall shear remembers past accelerations.
+    Womersley,
 }
 
 /// The stiffness of arteries by their size, E h/R0 = k1 e^(k2 R0) + k3 (Olufsen 1999).
@@ -75,13 +89,15 @@ pub struct NodeEntry {
     pub name: String,
     /// What happens there.
     pub kind: NodeKind,
+    /// Length of a stenosis in cm.
+    pub length: Option<f64>,
 }
 
 /// What happens at a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum NodeKind {
-    /// The input flow enters.
+    /// An input flow enters.
     Inlet,
     /// Vessels join: mass is conserved, total pressure continuous.
     Junction,
@@ -89,6 +105,8 @@ pub enum NodeKind {
     Rcr,
     /// Blood leaves through a resistance.
     Resistance,
+    /// Two vessels join through a narrowing that takes pressure.
+    Stenosis,
 }
 
 fn twenty() -> usize {
@@ -116,10 +134,11 @@ impl Default for Layout {
             thickness_to: None,
             wall: None,
             profile: parabola(),
+            friction: Friction::Steady,
             cells: 20,
             regions: 5,
         };
-        let node = |name: &str, kind| NodeEntry { name: name.to_owned(), kind };
+        let node = |name: &str, kind| NodeEntry { name: name.to_owned(), kind, length: None };
         Self {
             segments: vec![tube],
             nodes: vec![node("inlet", NodeKind::Inlet), node("outlet", NodeKind::Rcr)],

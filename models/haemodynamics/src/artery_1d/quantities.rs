@@ -6,6 +6,8 @@ use starlings_models_core::{Quantity, Role, Spec};
 
 use super::layout::{NodeKind, StiffnessParameter};
 use super::network::Network;
+use super::shear::TERMS;
+use super::stenosis::{MOST_SEVERE, TURBULENT, UNSTEADY};
 
 /// Young's modulus of an artery in dyn/cm².
 const YOUNG: f64 = 5e6;
@@ -24,15 +26,29 @@ pub(super) fn spec(network: &Network) -> Spec {
         states: states(network),
         parameters: parameters(network),
         outputs: outputs(network),
-        inputs: vec![Quantity::new("flow", FLOW).role(Role::Flow).says("Volume flow into the inlet.")],
+        inputs: inputs(network),
         measures: vec![("flow_rate".to_owned(), "Q".to_owned())],
         restart: true,
     }
 }
 
+/// `stem` for the only one of `nodes`, `stem_<node>` for one of several.
+fn of(nodes: &[usize], network: &Network, stem: &str, node: usize) -> String {
+    if nodes.len() == 1 { stem.to_owned() } else { format!("{stem}_{}", network.nodes[node].name) }
+}
+
 /// `stem` for the only outlet, `stem_<node>` for one of several.
 pub(super) fn named(network: &Network, stem: &str, node: usize) -> String {
-    if network.outlets.len() == 1 { stem.to_owned() } else { format!("{stem}_{}", network.nodes[node].name) }
+    of(&network.outlets, network, stem, node)
+}
+
+fn inputs(network: &Network) -> Vec<Quantity> {
+    let flow = |&node: &usize| {
+        let (name, alone) = (&network.nodes[node].name, network.inlets.len() == 1);
+        let says = if alone { "Volume flow into the inlet." } else { &format!("Volume flow into `{name}`.") };
+        Quantity::new(&of(&network.inlets, network, "flow", node), FLOW).role(Role::Flow).says(says)
+    };
+    network.inlets.iter().map(flow).collect()
 }
 
 fn states(network: &Network) -> Vec<Quantity> {
@@ -47,7 +63,45 @@ fn states(network: &Network) -> Vec<Quantity> {
             .role(Role::Pressure)
             .says(&format!("Pressure in the Windkessel at `{}`.", network.nodes[node].name))
     }));
+    all.extend(stenoses(network).map(|(node, name)| {
+        Quantity::new(&narrowed(network, "q", node), FLOW).role(Role::Flow).says(&format!(
+            "Volume flow through the stenosis `{name}`, out of the segment that is listed first."
+        ))
+    }));
+    if network.n_memory > 0 {
+        let memory = Quantity::new("w", "cm/s").size(TERMS.len() * network.n_memory);
+        all.push(memory.says(
+            "Past velocities that the wall shear remembers, ten parts in each cell with that friction.",
+        ));
+    }
     all
+}
+
+/// Nodes and names of the stenoses.
+fn stenoses(network: &Network) -> impl Iterator<Item = (usize, &str)> {
+    network.narrowings.iter().map(|n| n.nodes[0]).map(|node| (node, network.nodes[node].name.as_str()))
+}
+
+/// `stem` for the only stenosis, `stem_<node>` for one of several.
+fn narrowed(network: &Network, stem: &str, node: usize) -> String {
+    let nodes: Vec<usize> = stenoses(network).map(|(node, _)| node).collect();
+    of(&nodes, network, stem, node)
+}
+
+fn stenosis(network: &Network, (node, name): (usize, &str)) -> [Quantity; 3] {
+    let quantity = |stem: &str| Quantity::new(&narrowed(network, stem, node), "");
+    let says = |what: &str| format!("{what} of the stenosis `{name}`.");
+    [
+        quantity("severity")
+            .range(0.0, MOST_SEVERE)
+            .default(0.5)
+            .says(&says("Part of the area that is missing, 1 − As/A0,")),
+        quantity("K_t")
+            .range(0.0, f64::INFINITY)
+            .default(TURBULENT)
+            .says(&says("Young and Tsai's constant of turbulence")),
+        quantity("K_u").positive().default(UNSTEADY).says(&says("Young and Tsai's constant of inertia")),
+    ]
 }
 
 fn parameters(network: &Network) -> Vec<Quantity> {
@@ -65,6 +119,7 @@ fn parameters(network: &Network) -> Vec<Quantity> {
     for &node in &network.outlets {
         all.extend(outlet(network, node));
     }
+    all.extend(stenoses(network).flat_map(|which| stenosis(network, which)));
     all
 }
 
@@ -121,8 +176,13 @@ fn outputs(network: &Network) -> Vec<Quantity> {
         field("displacement", "cm", Role::Displacement).says("R − R0 in each cell."),
         field("pressure", PRESSURE, Role::Pressure).says("Pressure in each cell."),
         field("flow_rate", FLOW, Role::Flow).says("Volume flow in each cell."),
-        Quantity::new("inlet_pressure", PRESSURE).role(Role::Pressure).says("Pressure at the inlet."),
     ];
+    for &node in &network.inlets {
+        let (name, alone) = (&network.nodes[node].name, network.inlets.len() == 1);
+        let says = if alone { "Pressure at the inlet." } else { &format!("Pressure at `{name}`.") };
+        let quantity = Quantity::new(&of(&network.inlets, network, "inlet_pressure", node), PRESSURE);
+        all.push(quantity.role(Role::Pressure).says(says));
+    }
     for &node in &network.outlets {
         let name = &network.nodes[node].name;
         all.push(
@@ -136,6 +196,11 @@ fn outputs(network: &Network) -> Vec<Quantity> {
                 .says(&format!("Volume flow out of `{name}`.")),
         );
     }
+    all.extend(stenoses(network).map(|(node, name)| {
+        Quantity::new(&narrowed(network, "pressure_drop", node), PRESSURE)
+            .role(Role::Pressure)
+            .says(&format!("Total pressure p + ½ρu² before the stenosis `{name}` less that behind it."))
+    }));
     all.push(Quantity::new("strain", "").size(n).says("Circumferential strain of the wall in each cell."));
     all.push(
         Quantity::new("stress", PRESSURE)

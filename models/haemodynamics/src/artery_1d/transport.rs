@@ -7,7 +7,6 @@
 //! sides; the force of the pressure inside a cell is that of its own reconstruction. Next file to read: [`super::viscous`].
 
 use super::Fault;
-use super::layout::NodeKind;
 use super::node::{Arriving, Condition, Met};
 use super::vessels::Vessels;
 
@@ -60,7 +59,7 @@ impl Vessels<'_> {
         &self,
         x: &[f64],
         viscous: &[f64],
-        inflow: f64,
+        inflow: &[f64],
         faces: &mut Faces,
         rate: &mut [f64],
     ) -> Result<(), Fault> {
@@ -90,6 +89,14 @@ impl Vessels<'_> {
                     (self.outflow(node, faces) - (behind - self.p_venous) / distal) / compliance;
             }
         }
+        for (k, (loss, narrowing)) in self.losses.iter().zip(&self.network.narrowings).enumerate() {
+            // What the walls' viscosity adds on either side is implicit, as the loss is.
+            let [before, after] = narrowing
+                .nodes
+                .map(|node| faces.node[node] - viscous[self.network.nodes[node].ends[0].index()]);
+            rate[self.narrowed + k] = (before - after) / loss.inertance;
+        }
+        rate[self.remembered..].fill(0.0);
         Ok(())
     }
 
@@ -175,7 +182,7 @@ impl Vessels<'_> {
         node: usize,
         x: &[f64],
         viscous: &[f64],
-        inflow: f64,
+        inflow: &[f64],
         faces: &mut Faces,
     ) -> Result<(), Fault> {
         let of = &self.network.nodes[node];
@@ -192,13 +199,14 @@ impl Vessels<'_> {
         }));
         met.clear();
         met.resize(arriving.len(), Met::default());
-        let condition = match (of.kind, of.outlet) {
-            (NodeKind::Inlet, _) => Condition::Joint { inflow, total: false },
-            (_, Some(i)) => {
+        let condition = match (of.inlet, of.outlet, of.narrowing) {
+            (Some(i), ..) => Condition::Joint { inflow: inflow[i], total: false },
+            (_, Some(i), _) => {
                 let outlet = self.outlets[i];
                 Condition::Outlet { resistance: outlet.proximal, behind: self.behind(outlet, x) }
             }
-            (_, None) => Condition::Joint { inflow: 0.0, total: true },
+            (.., Some((i, sign))) => Condition::Joint { inflow: sign * x[self.narrowed + i], total: true },
+            _ => Condition::Joint { inflow: 0.0, total: true },
         };
         let solved = condition.meet(self.rho, arriving, met);
         faces.node[node] = solved.ok_or_else(|| Fault::Node { name: of.name.clone() })?;
@@ -212,8 +220,8 @@ impl Vessels<'_> {
         Ok(())
     }
 
-    /// The longest stable time step: half a cell at the fastest wave, and half the shortest time of friction and of a
-    /// Windkessel; NaN where a vessel has no waves.
+    /// The longest stable time step: half a cell at the fastest wave, and half the shortest time of friction, of a
+    /// Windkessel and of the blood in a narrowing between its vessels; NaN where a vessel has no waves.
     pub(super) fn longest_step(&self, x: &[f64]) -> f64 {
         let n = self.network.n_cell;
         let mut rate = 0.0_f64;
@@ -229,14 +237,23 @@ impl Vessels<'_> {
         }
         for (outlet, &node) in self.outlets.iter().zip(&self.network.outlets) {
             if let Some((_, distal, compliance)) = outlet.chamber {
-                let end = self.network.nodes[node].ends[0];
-                let tube = &self.network.tubes[end.tube];
-                let cell = tube.first + if end.sign > 0.0 { tube.n - 1 } else { 0 };
-                let impedance = self.rho * self.cells[cell].speed(x[cell], self.rho) / x[cell];
+                let impedance = self.impedance(node, x);
                 rate = rate.max((1.0 / distal + 1.0 / (outlet.proximal + impedance)) / compliance);
             }
         }
+        for (loss, narrowing) in self.losses.iter().zip(&self.network.narrowings) {
+            let impedances = narrowing.nodes.map(|node| self.impedance(node, x));
+            rate = rate.max((impedances[0] + impedances[1]) / loss.inertance);
+        }
         COURANT / rate
+    }
+
+    /// Characteristic impedance ρc/A of the cell that a node with one end stands at, in dyn s/cm⁵.
+    fn impedance(&self, node: usize, x: &[f64]) -> f64 {
+        let end = self.network.nodes[node].ends[0];
+        let tube = &self.network.tubes[end.tube];
+        let cell = tube.first + if end.sign > 0.0 { tube.n - 1 } else { 0 };
+        self.rho * self.cells[cell].speed(x[cell], self.rho) / x[cell]
     }
 }
 

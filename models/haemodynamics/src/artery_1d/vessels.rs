@@ -6,6 +6,8 @@ use std::f64::consts::PI;
 
 use super::layout::NodeKind;
 use super::network::{Network, Tube};
+use super::shear::TERMS;
+use super::stenosis::Loss;
 use super::wall::Ring;
 
 /// Number of parameters that all vessels share.
@@ -44,6 +46,11 @@ pub(super) struct Vessels<'a> {
     /// Pressure of the initial state.
     pub(super) p_start: f64,
     pub(super) outlets: Vec<Outlet>,
+    pub(super) losses: Vec<Loss>,
+    /// Number of the state that is the flow through the first narrowing; the others follow.
+    pub(super) narrowed: usize,
+    /// Number of the first state of the wall shear's memory.
+    pub(super) remembered: usize,
 }
 
 impl<'a> Vessels<'a> {
@@ -52,6 +59,9 @@ impl<'a> Vessels<'a> {
         let n = network.tubes.len();
         let [rho, mu, nu, alpha, c_w, k_s, c_s, p_ext, p_venous, p_start] =
             std::array::from_fn(|i| theta[n + i]);
+        let (outlets, rest) = outlets(network, &theta[n + N_SHARED..]);
+        let loss = |(narrowing, own): (_, &[f64])| Loss::new(narrowing, [own[0], own[1], own[2]], mu, rho);
+        let n_chamber = outlets.iter().filter(|outlet| outlet.chamber.is_some()).count();
         let mut vessels = Self {
             network,
             cells: Vec::with_capacity(network.n_cell),
@@ -65,7 +75,10 @@ impl<'a> Vessels<'a> {
             p_ext,
             p_venous,
             p_start,
-            outlets: outlets(network, &theta[n + N_SHARED..]),
+            outlets,
+            losses: network.narrowings.iter().zip(rest.chunks(3)).map(loss).collect(),
+            narrowed: 2 * network.n_cell + n_chamber,
+            remembered: 2 * network.n_cell + n_chamber + network.narrowings.len(),
         };
         for (tube, young) in network.tubes.iter().zip(theta) {
             let ring = |radius: f64, thickness: f64| {
@@ -95,7 +108,7 @@ impl<'a> Vessels<'a> {
 
     /// Number of state components.
     pub(super) fn n_state(&self) -> usize {
-        2 * self.network.n_cell + self.outlets.iter().filter(|o| o.chamber.is_some()).count()
+        self.remembered + TERMS.len() * self.network.n_memory
     }
 
     /// The face before the first cell of a tube; its other faces follow.
@@ -109,7 +122,8 @@ impl<'a> Vessels<'a> {
     }
 }
 
-fn outlets(network: &Network, theta: &[f64]) -> Vec<Outlet> {
+/// The outlets, and the parameters behind theirs.
+fn outlets<'a>(network: &Network, theta: &'a [f64]) -> (Vec<Outlet>, &'a [f64]) {
     let (mut theta, mut n_chamber) = (theta, 0);
     let mut all = Vec::with_capacity(network.outlets.len());
     for &node in &network.outlets {
@@ -122,5 +136,5 @@ fn outlets(network: &Network, theta: &[f64]) -> Vec<Outlet> {
         });
         all.push(Outlet { proximal: values[0], chamber });
     }
-    all
+    (all, theta)
 }

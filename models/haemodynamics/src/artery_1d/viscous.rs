@@ -1,31 +1,29 @@
-//! The viscosity of wall and tissue: a diffusion of the flow, implicit in time.
+//! What is implicit in time: the viscosity of wall and tissue, a diffusion of the flow, with the losses of [`super::stenosis`] and
+//! the memory of [`super::shear`].
 //!
 //! A radial velocity ∂R/∂t = −(∂Q/∂x)/(2πR) adds p_v = −Γ (∂Q/∂x)/(2πR) to the pressure, Γ = c_w + c_s, and
 //! −(A/ρ) ∂p_v/∂x to the rate of Q (Alastruey et al. 2011). With p_v the equations ask for one condition at each end, on the
 //! whole pressure p_ext + elastic + p_v: half a cell from the end, p_v follows from the flow through it, and the nodes'
 //! pressures are unknowns together with the flows in the cells. Each tube is a tridiagonal system and its response to the
-//! pressures of its two nodes; what the nodes ask for closes the system. Next file to read: [`super::step`].
+//! pressures of its two nodes; what the nodes ask for closes the system. Next file to read: [`super::pressures`].
 
 use std::f64::consts::PI;
 
-use nalgebra::{DMatrix, DVector};
-
 use super::Fault;
 use super::layout::NodeKind;
-use super::network::End;
 use super::vessels::Vessels;
 use super::wall::radius;
 
 /// How one end of a tube couples flow and pressure: p_v = P − b, b = b0 + d (Q − Q_0), flow through the end
 /// s Q + (b − P)/g into the node.
 #[derive(Clone, Copy, Debug, Default)]
-struct Coupling {
+pub(super) struct Coupling {
     /// b0: external, elastic and, at a junction, dynamic pressure at the end.
-    pressure: f64,
+    pub(super) pressure: f64,
     /// d: change of the dynamic pressure with the flow.
-    slope: f64,
+    pub(super) slope: f64,
     /// 1/g, flow per viscous pressure over half a cell.
-    mobility: f64,
+    pub(super) mobility: f64,
 }
 
 /// The viscous part of a state; reused from step to step.
@@ -33,13 +31,16 @@ struct Coupling {
 pub(super) struct Viscous {
     /// Γ/(2πR dx) at each face; zero at the ends.
     weight: Vec<f64>,
-    couplings: Vec<Coupling>,
+    pub(super) couplings: Vec<Coupling>,
     /// What the factored matrices have above their diagonal of ones.
     above: Vec<f64>,
     /// Flows in the cells if the nodes had no pressure.
-    free: Vec<f64>,
+    pub(super) free: Vec<f64>,
     /// Response of the flows to the pressure at the start and at the end of their tube.
-    response: [Vec<f64>; 2],
+    pub(super) response: [Vec<f64>; 2],
+    /// What the memory of the wall shear does to the flow in each cell, zero where there is none ([`super::shear`]).
+    pub(super) drag: Vec<f64>,
+    pub(super) pull: Vec<f64>,
     /// p_v at each face.
     pub(super) face: Vec<f64>,
     /// p_v at each end, in the order of [`End::index`].
@@ -56,6 +57,8 @@ impl Viscous {
             above: vec![0.0; n],
             free: vec![0.0; n],
             response: [vec![0.0; n], vec![0.0; n]],
+            drag: vec![0.0; n],
+            pull: vec![0.0; n],
             face: vec![0.0; n_face],
             end: vec![0.0; n_end],
         }
@@ -64,27 +67,31 @@ impl Viscous {
 
 impl Vessels<'_> {
     /// Solves Q − τ G(Q) = r for the flows of the state `x`, which hold r, at fixed areas, and writes G(Q), the viscous part
-    /// of the rate of Q; with τ = 0 it is that of the given flows.
+    /// of the rate of Q; with τ = 0 it is that of the given flows. Flows through narrowings are among them.
     ///
     /// # Errors
     /// When the nodes' pressures have no solution, in a vessel that has collapsed.
     pub(super) fn diffuse(
         &self,
         tau: f64,
-        inflow: f64,
+        inflow: &[f64],
         x: &mut [f64],
         work: &mut Viscous,
         rate: &mut [f64],
     ) -> Result<(), Fault> {
         rate.fill(0.0);
+        self.remember(tau, x, work);
         if self.damping <= 0.0 {
+            self.drag(x, work);
+            self.shear(tau, x, rate);
+            self.slow(tau, x, rate);
             return Ok(());
         }
         for tube in 0..self.network.tubes.len() {
             self.couple(tube, x, work);
             self.respond(tube, tau, x, work);
         }
-        let pressures = self.node_pressures(inflow, x, work)?;
+        let pressures = self.node_pressures(tau, inflow, x, work)?;
         let n = self.network.n_cell;
         for (i, tube) in self.network.tubes.iter().enumerate() {
             let [from, to] = tube.nodes.map(|node| pressures[node]);
@@ -112,6 +119,14 @@ impl Vessels<'_> {
                 let force = work.face[first + j + 1] - work.face[first + j];
                 rate[n + cell] = -x[cell] / (self.rho * tube.dx) * force;
             }
+        }
+        self.shear(tau, x, rate);
+        for (k, (loss, narrowing)) in self.losses.iter().zip(&self.network.narrowings).enumerate() {
+            let flow = pressures[self.network.nodes.len() + k];
+            let [before, after] =
+                narrowing.nodes.map(|node| work.end[self.network.nodes[node].ends[0].index()]);
+            x[self.narrowed + k] = flow;
+            rate[self.narrowed + k] = (before - after - loss.steady(flow)) / loss.inertance;
         }
         Ok(())
     }
@@ -156,10 +171,13 @@ impl Vessels<'_> {
         let couplings = &work.couplings[2 * tube..2 * tube + 2];
         let [start, end] = &mut work.response;
         let (start, end) = (&mut start[cells.clone()], &mut end[cells.clone()]);
-        let (free, above) = (&mut work.free[cells.clone()], &mut work.above[cells]);
+        let (free, above) = (&mut work.free[cells.clone()], &mut work.above[cells.clone()]);
+        let (drag, pull) = (&work.drag[cells.clone()], &work.pull[cells]);
         let scale = |j: usize| tau * area[j] / (self.rho * of.dx);
         let last = of.n - 1;
-        free.copy_from_slice(flow);
+        for (free, (flow, pull)) in free.iter_mut().zip(flow.iter().zip(pull)) {
+            *free = flow - pull;
+        }
         start.fill(0.0);
         end.fill(0.0);
         free[0] -= scale(0) * (couplings[0].pressure - couplings[0].slope * flow[0]);
@@ -168,7 +186,7 @@ impl Vessels<'_> {
         end[last] = -scale(last);
         for j in 0..of.n {
             let a = scale(j);
-            let mut pivot = 1.0 + a * (weight[j] + weight[j + 1]);
+            let mut pivot = 1.0 + drag[j] + a * (weight[j] + weight[j + 1]);
             if j == 0 {
                 pivot += a * couplings[0].slope;
             } else {
@@ -192,37 +210,6 @@ impl Vessels<'_> {
             }
         }
     }
-
-    /// The pressures of the nodes: what the ends send there, as [`super::node::Condition`] asks.
-    fn node_pressures(&self, inflow: f64, x: &[f64], work: &Viscous) -> Result<DVector<f64>, Fault> {
-        let (nodes, tubes) = (&self.network.nodes, &self.network.tubes);
-        let n = self.network.n_cell;
-        let mut matrix = DMatrix::<f64>::zeros(nodes.len(), nodes.len());
-        let mut right = DVector::<f64>::zeros(nodes.len());
-        for (row, node) in nodes.iter().enumerate() {
-            let m = node.outlet.map_or(1.0, |i| self.outlets[i].proximal);
-            if row == self.network.inlet {
-                right[row] -= inflow;
-            }
-            if let Some(i) = node.outlet {
-                matrix[(row, row)] -= 1.0;
-                right[row] -= self.behind(self.outlets[i], x);
-            }
-            for &end in &node.ends {
-                let End { tube, sign } = end;
-                let cell = tubes[tube].first + if sign > 0.0 { tubes[tube].n - 1 } else { 0 };
-                let Coupling { pressure, slope, mobility } = work.couplings[end.index()];
-                let weight = m * (sign + slope * mobility);
-                for (side, &other) in tubes[tube].nodes.iter().enumerate() {
-                    matrix[(row, other)] += weight * work.response[side][cell];
-                }
-                matrix[(row, row)] -= m * mobility;
-                right[row] -= weight * work.free[cell] + m * mobility * (pressure - slope * x[n + cell]);
-            }
-        }
-        let solved = matrix.lu().solve(&right).filter(|p: &DVector<f64>| p.iter().all(|p| p.is_finite()));
-        solved.ok_or(Fault::Network)
-    }
 }
 
 #[cfg(test)]
@@ -241,10 +228,10 @@ mod tests {
         model.initial(&theta, &mut x);
         let vessels = Vessels::new(&model.network, &theta);
         let mut rate = x.clone();
-        assert_eq!(vessels.rate(0.0, &x, &mut Work::new(&vessels), &mut rate), Ok(()));
+        assert_eq!(vessels.rate(&[0.0], &x, &mut Work::new(&vessels), &mut rate), Ok(()));
         // The pressure behind the outlet.
         x[40] = f64::INFINITY;
-        let fault = vessels.rate(0.0, &x, &mut Work::new(&vessels), &mut rate);
+        let fault = vessels.rate(&[0.0], &x, &mut Work::new(&vessels), &mut rate);
         assert_eq!(fault, Err(Fault::Network));
         assert!(Fault::Network.at(0.5).to_string().contains("the network at t = 0.5"));
     }

@@ -79,14 +79,25 @@ pub(crate) fn run(
     model: &Artery1d,
     theta: &[f64],
     x: &mut [f64],
-    [t0, t1]: [f64; 2],
+    times: [f64; 2],
     flow: [f64; 2],
 ) -> [f64; 2] {
-    let slope = [(flow[1] - flow[0]) / (t1 - t0)];
+    run_inlets(model, theta, x, times, [&flow[..1], &flow[1..]])
+}
+
+/// The same with a flow at each of several inlets.
+pub(crate) fn run_inlets(
+    model: &Artery1d,
+    theta: &[f64],
+    x: &mut [f64],
+    [t0, t1]: [f64; 2],
+    flows: [&[f64]; 2],
+) -> [f64; 2] {
+    let slope: Vec<f64> = flows[0].iter().zip(flows[1]).map(|(from, to)| (to - from) / (t1 - t0)).collect();
     let segment = Segment {
         t0,
         t1,
-        u0: &flow[..1],
+        u0: flows[0],
         slope: &slope,
         history: &NoHistory,
         limits: &Limits::none(),
@@ -122,8 +133,14 @@ pub(crate) fn rate(model: &Artery1d, theta: &[f64], x: &[f64], flow: f64) -> Vec
 }
 
 pub(crate) fn outputs(model: &Artery1d, theta: &[f64], x: &[f64], flow: f64) -> Vec<f64> {
+    outputs_inlets(model, theta, x, &[flow])
+}
+
+/// The same with a flow at each of several inlets.
+pub(crate) fn outputs_inlets(model: &Artery1d, theta: &[f64], x: &[f64], flows: &[f64]) -> Vec<f64> {
+    let none = vec![0.0; flows.len()];
     let mut y = vec![f64::NAN; model.spec().n_output()];
-    model.output(0.0, x, theta, Drive { value: &[flow], slope: &[0.0], history: &NoHistory }, &mut y);
+    model.output(0.0, x, theta, Drive { value: flows, slope: &none, history: &NoHistory }, &mut y);
     y
 }
 
