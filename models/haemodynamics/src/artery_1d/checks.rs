@@ -35,6 +35,24 @@ fn wall(path: &str, segment: &Segment) -> Result<(), SetupError> {
     Ok(())
 }
 
+/// Refuses a profile that has no friction, or another than that of the friction asked for.
+fn profile(path: &str, segment: &Segment) -> Result<(), SetupError> {
+    if !(segment.profile >= 2.0 && segment.profile.is_finite()) {
+        let message =
+            format!("profile is {}: give 2 for a parabola, more for a flatter profile", segment.profile);
+        return Err(fault(path, message));
+    }
+    if segment.friction == Friction::Womersley && segment.profile > 2.0 {
+        let message = format!(
+            "profile is {}: the profile of friction = \"womersley\" follows from the flow, and is a parabola when that is \
+             steady; leave one of the two out",
+            segment.profile
+        );
+        return Err(fault(path, message));
+    }
+    Ok(())
+}
+
 /// Length in cm of a stenosis, where node `i` is one.
 ///
 /// # Errors
@@ -83,19 +101,7 @@ pub(super) fn segments(segments: &[Segment]) -> Result<(), SetupError> {
             }
         }
         wall(&path("wall"), segment)?;
-        if !(segment.profile >= 2.0 && segment.profile.is_finite()) {
-            let message =
-                format!("profile is {}: give 2 for a parabola, more for a flatter profile", segment.profile);
-            return Err(fault(&path("profile"), message));
-        }
-        if segment.friction == Friction::Womersley && segment.profile > 2.0 {
-            let message = format!(
-                "profile is {}: the profile of friction = \"womersley\" follows from the flow, and is a parabola when that is \
-                 steady; leave one of the two out",
-                segment.profile
-            );
-            return Err(fault(&path("profile"), message));
-        }
+        profile(&path("profile"), segment)?;
         let (cells, regions) = (segment.cells, segment.regions);
         (n_cell, n_region) = (n_cell.saturating_add(cells), n_region.saturating_add(regions));
         for (key, n, most) in [("cells", n_cell, MOST_CELLS), ("regions", n_region, MOST_REGIONS)] {
