@@ -140,8 +140,8 @@ fn a_lag_of_the_sensor_is_that_of_first_order() {
     // The rows are the output and the state.
     for (t, value) in bench.window.times.iter().zip(got.iter().step_by(2)).filter(|(t, _)| **t > 0.5) {
         let want = ((w * t).sin() - w * tau * (w * t).cos()) / (1.0 + (w * tau) * (w * tau));
-        // Three nodes leave 3!^2 of the sixth term of the expansion in w tau, (w tau)^6 = 2e-4 with its weights.
-        assert!((value - want).abs() < 5e-3, "{t}: {value} instead of {want}");
+        // The scatter of ages within the cells is lost, 0.037 tau^2, and half of it times (w tau)^2 = 0.06 is 1e-3.
+        assert!((value - want).abs() < 2e-3, "{t}: {value} instead of {want}");
     }
 }
 

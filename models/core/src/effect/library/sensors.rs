@@ -17,13 +17,25 @@ pub(super) const GROWERS: &[Grow] = &[offset, drift, gain, lag, delay, saturatio
 /// Longest delay and lag, in sampling intervals: what is longer is seen in the data with the eye.
 pub(super) const LONGEST: f64 = 30.0;
 
-/// Nodes and weights of Gauss–Laguerre quadrature with three points (Abramowitz and Stegun 1964, table 25.9): the mean of a
-/// signal's past under an exponential memory.
-const LAGUERRE: [(f64, f64); 3] = [
-    (0.415_774_556_783_479, 0.711_093_009_929_173),
-    (2.294_280_360_279_042, 0.278_517_733_569_241),
-    (6.289_945_082_937_479, 0.010_389_256_501_586),
-];
+/// Cells into which an exponential memory is cut.
+const CELLS: u32 = 8;
+
+/// Nodes, in time constants, and weights of the mean of a signal's past under an exponential memory: its mean age within each of n = 8
+/// cells, and the share of the memory that lies there. Total weight and mean age are one, so that a steady slope is followed exactly. A
+/// signal that bends, as what a switch drives, is followed to 1/(2n²) = 0.8 % of the bend in slope times the time constant: the cells end
+/// where e^(−x/2) = 1 − k/n, which makes that error, their length squared times e^(−x)/8, the same in all of them.
+fn memory() -> impl Iterator<Item = (f64, f64)> {
+    let end = |k: u32| {
+        let rest = f64::from(CELLS - k) / f64::from(CELLS);
+        // Memory and moment of all that is older, e^(−x) and (x + 1) e^(−x); the last cell has no end.
+        let share = rest * rest;
+        (share, if k < CELLS { share * (1.0 - share.ln()) } else { 0.0 })
+    };
+    (0..CELLS).map(move |k| {
+        let ((from, age_from), (to, age_to)) = (end(k), end(k + 1));
+        ((age_from - age_to) / (from - to), from - to)
+    })
+}
 
 /// One effect for every output that one number describes.
 fn every(host: Host<'_>, one: impl Fn(&EffectPlace<'_>, &Quantity) -> EffectDef) -> Vec<EffectDef> {
@@ -76,7 +88,7 @@ fn lag(host: Host<'_>) -> Vec<EffectDef> {
     every(host, |place, y| {
         let (tau, name) = (place.name("sensor_lag"), &y.name);
         let mut term = String::new();
-        for (node, weight) in LAGUERRE {
+        for (node, weight) in memory() {
             // Writing to a text does not fail.
             let _ = write!(term, "{weight}*(delay({name}, {node}*{tau}) - {name}) + ");
         }
@@ -149,4 +161,24 @@ fn quantisation(host: Host<'_>) -> Vec<EffectDef> {
         .confounders(&["sensor-saturation"])
         .source("Widrow and Kollár 2008, Quantization Noise")
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_memory_of_a_lag_follows_a_slope_exactly_and_a_bend_nearly() {
+        let sum = |of: fn(f64, f64) -> f64| memory().map(|(node, weight)| of(node, weight)).sum::<f64>();
+        assert!(
+            (sum(|_, weight| weight) - 1.0).abs() < 1e-14
+                && (sum(|x, weight| x * weight) - 1.0).abs() < 1e-14
+        );
+        // A slope of one that begins at zero is shown as x − 1 + e^(−x).
+        for x in (0..800).map(|k| 0.01 * f64::from(k)) {
+            let shown: f64 = memory().map(|(node, weight)| weight * (x - node).max(0.0)).sum();
+            let error = x - 1.0 + (-x).exp() - shown;
+            assert!(error > -1e-12 && error < 1.0 / 128.0, "{x}: {error}");
+        }
+    }
 }
