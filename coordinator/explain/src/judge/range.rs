@@ -36,10 +36,11 @@ pub(super) fn at_edge(fit: &FittedVariant<'_>) -> Option<Refusal> {
 }
 
 /// The end of the range of an effect's parameter `k` at which a value lies. Where the range is open at one side, the unit of the
-/// amplitude takes the place of its width, or the value at which an inner parameter was screened.
+/// amplitude takes the place of its width, or the value at which an inner parameter was screened. A corner that is not rounded is none.
 fn end_at(effect: &AddedEffect<'_>, k: usize, value: f64) -> Option<f64> {
     let candidate = effect.candidate;
-    let [lo, hi] = candidate.def.parameters[k].range;
+    let parameter = &candidate.def.parameters[k];
+    let [lo, hi] = parameter.range;
     let width = if lo.is_finite() && hi.is_finite() {
         hi - lo
     } else if k == 0 {
@@ -47,7 +48,8 @@ fn end_at(effect: &AddedEffect<'_>, k: usize, value: f64) -> Option<f64> {
     } else {
         candidate.points[0][k - 1].abs()
     };
-    [lo, hi].into_iter().find(|end| end.is_finite() && (value - end).abs() <= EDGE * width)
+    let ends = if parameter.is_rounding { [hi, hi] } else { [lo, hi] };
+    ends.into_iter().find(|end| end.is_finite() && (value - end).abs() <= EDGE * width)
 }
 
 #[cfg(test)]
@@ -61,7 +63,12 @@ mod tests {
     fn closeness_to_the_end_of_an_open_range_is_measured_in_the_parameters_own_size() {
         let with = |range, grid| EffectParameter { range, grid, ..EffectParameter::default() };
         let (open, wide) = ([0.0, f64::INFINITY], [0.0, 10.0]);
-        let parameters = vec![with(open, vec![]), with([2.0, f64::INFINITY], vec![3.0]), with(wide, vec![])];
+        let parameters = vec![
+            with(open, vec![]),
+            with([2.0, f64::INFINITY], vec![3.0]),
+            with(wide, vec![]),
+            EffectParameter { is_rounding: true, ..with(wide, vec![]) },
+        ];
         let candidate = Candidate::new(EffectDef { parameters, ..EffectDef::default() });
         // The amplitude's unit is not that of the threshold inside the term: thousands against ones, or thousandths.
         for unit in [4000.0, 4e-3] {
@@ -72,6 +79,12 @@ mod tests {
             assert_eq!(end_at(&effect, 1, 2.01), Some(2.0), "a three hundredth of it away, unit {unit}");
             assert_eq!(end_at(&effect, 2, 9.96), Some(10.0));
             assert_eq!(end_at(&effect, 2, 9.9), None);
+            assert_eq!(
+                (end_at(&effect, 2, 0.04), end_at(&effect, 3, 0.04)),
+                (Some(0.0), None),
+                "a sharp corner"
+            );
+            assert_eq!(end_at(&effect, 3, 9.96), Some(10.0));
         }
     }
 }

@@ -64,6 +64,10 @@ pub struct EffectParameter {
     pub grid: Vec<f64>,
     /// In what the range and the grid are counted.
     pub scale: Scale,
+    /// Whether it is a width over which the term rounds a corner: at zero the term is what the effect's name says, so that neither this
+    /// end of the range nor data that do not tell the width speak against the effect.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub is_rounding: bool,
     /// One plain sentence; may be empty.
     pub says: String,
 }
@@ -76,6 +80,7 @@ impl Default for EffectParameter {
             range: crate::bounds::unbounded(),
             grid: Vec::new(),
             scale: Scale::Absolute,
+            is_rounding: false,
             says: String::new(),
         }
     }

@@ -25,6 +25,7 @@ use super::{EffectDef, Target};
 use crate::SetupError;
 use crate::{Spec, nearest};
 
+pub use mechanics::SIGN_WIDTHS;
 use place::Host;
 
 /// Finds every place for one kind of effect in a model.

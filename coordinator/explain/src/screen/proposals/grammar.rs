@@ -4,6 +4,7 @@
 //! scale takes it from the course of its quantity. A factor of constant sign has no direction and no size of its own. Next file to
 //! read: [`super`].
 
+use starlings_models::effect::library::SIGN_WIDTHS;
 use starlings_models::effect::{Addition, EffectParameter};
 use starlings_models::units::Unit;
 use starlings_models::{EffectDef, Quantity, Role};
@@ -13,7 +14,7 @@ use crate::locate::Track;
 
 /// Quantities that enter at most, those of the study's order: the number of terms grows with its square.
 const MOST: usize = 6;
-/// Part of a quantity's swing over which its direction changes.
+/// Part of a quantity's swing below which its root goes straight to zero.
 const WIDTH: f64 = 0.02;
 
 /// A state or input with the ends of its course.
@@ -89,8 +90,11 @@ impl Equation<'_> {
         if q.changes_sign() {
             let square = format!("goes with the square of {x} and has its sign");
             self.add("odd-square", &[(q, 2.0)], 0.0, &square, |k| format!("{k}*{x}*abs({x})"));
-            let direction = format!("has one size and the sign of {x}");
-            self.add("direction", &[(q, 0.0)], 0.0, &direction, |k| format!("{k}*tanh({x}/{width:?})"));
+            // As a dry friction of the library, so that the two are known as one effect.
+            let [most, tried] = SIGN_WIDTHS.map(|share| share * q.swing());
+            self.with_inner(q, "direction", [0.0, most], vec![tried], |k, h| {
+                (format!("{k}*tanh({x}/{h})"), format!("has one size and the sign of {x}"))
+            });
             let size = format!("goes with the size of {x}, whatever its sign");
             self.add("size", &[(q, 1.0)], 0.0, &size, |k| format!("{k}*abs({x})"));
             let clamped = |k: &str, h: &str| {
@@ -162,9 +166,10 @@ impl Equation<'_> {
         let told = [self.state.name.as_str(), q.name()];
         let (amplitude, inner) = (coefficient("k", stem, &told), coefficient("at", stem, &told));
         let (text, says) = term(&amplitude, &inner);
-        let power = if stem == "limited" { 0.0 } else { 1.0 };
+        let power = if ["limited", "direction"].contains(&stem) { 0.0 } else { 1.0 };
         let unit = self.unit(&[(q.of.unit.as_str(), power)]);
-        let inside = EffectParameter { range, grid, ..parameter(&inner, q.of.unit.clone()) };
+        let is_rounding = stem == "direction";
+        let inside = EffectParameter { range, grid, is_rounding, ..parameter(&inner, q.of.unit.clone()) };
         self.push(
             format!("{stem}:{}", told.join(":")),
             &says,

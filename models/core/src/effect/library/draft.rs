@@ -69,8 +69,25 @@ impl Draft {
             grid: grid.to_vec(),
             scale,
             says: says.to_owned(),
+            ..EffectParameter::default()
         });
         self
+    }
+
+    /// Adds the width over which a term rounds a corner.
+    pub(super) fn rounding(
+        self,
+        name: &str,
+        unit: &str,
+        (range, tried): ([f64; 2], f64),
+        scale: Scale,
+        says: &str,
+    ) -> Self {
+        let mut draft = self.inner(name, unit, (range, &[tried]), scale, says);
+        if let Some(parameter) = draft.0.parameters.last_mut() {
+            parameter.is_rounding = true;
+        }
+        draft
     }
 
     /// Adds the instant at which something changes; neither end of the record can tell it.

@@ -29,8 +29,10 @@ pub(super) const GROWERS: &[Grow] = &[
     added_mass,
 ];
 
-/// Part of a velocity's amplitude over which a dry friction changes its sign.
-const SIGN_WIDTH: f64 = 0.02;
+/// Parts of a velocity's amplitude over which a dry friction changes its sign: the largest, and the one that is tried. A body that half of
+/// the friction holds at rest creeps with half of this width (tanh⁻¹ ½ = 0.55), so that recordings of small noise tell it: a wrong one
+/// would be made up for by a friction that fades, or limits itself.
+pub const SIGN_WIDTHS: [f64; 2] = [0.05, 0.02];
 
 /// A displacement with the velocity that changes it.
 struct Spring<'a> {
@@ -79,11 +81,12 @@ fn coulomb_friction(host: Host<'_>) -> Vec<EffectDef> {
     host.each(host.states(Role::Velocity)).into_iter().map(one).collect()
 }
 
-/// A fixed width over which a friction changes its sign.
+/// The width over which a friction changes its sign.
 fn sign_width(draft: Draft, velocity: &Quantity, name: &str) -> Draft {
     let scale = Scale::Amplitude(velocity.name.clone());
     let says = "Velocity within which the friction changes its sign.";
-    draft.inner(name, &velocity.unit, ([SIGN_WIDTH, SIGN_WIDTH], &[SIGN_WIDTH]), scale, says)
+    let [most, tried] = SIGN_WIDTHS;
+    draft.rounding(name, &velocity.unit, ([0.0, most], tried), scale, says)
 }
 
 /// What dry friction has more near rest, −f sign(v) exp(−(v/v₀)²).
