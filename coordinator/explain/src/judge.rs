@@ -4,7 +4,7 @@
 //! [`misfit`], [`adequacy`] (residuals against the stated noise), [`uncertainty`] (what the uncertainty of an estimate explains),
 //! [`held_out`], [`form`] (whether an effect has the right form), [`gates`], [`search_result`] (all that was judged),
 //! [`noise_model`] (whether the noise is correlated), [`contribution`] (whether every effect takes away its share), [`objections`]
-//! (what speaks against a name), [`verdict`], [`probability`] (how probable each answer is).
+//! (what speaks against a name), [`rivals`] (what comes as close), [`verdict`], [`probability`] (how probable each answer is).
 
 pub(crate) mod adequacy;
 pub(crate) mod contribution;
@@ -18,6 +18,7 @@ pub(crate) mod null_distribution;
 mod objections;
 pub(crate) mod probability;
 mod range;
+mod rivals;
 pub(crate) mod search_result;
 mod uncertainty;
 pub(crate) mod verdict;

@@ -4,27 +4,24 @@
 //! what it leaves beyond chance. Otherwise the verdict is a tie, or unexplained with the variant that came nearest. Next file
 //! to read: [`crate::tell::summary`].
 
-use starlings_estimators::effective_sample_size;
 use starlings_models::equations::{Expression, Slot};
 
 use super::contribution::{ContributionCheck, DISCREPANT, check_contributions};
 use super::gates::JudgedFit;
 use super::objections::{nearest_refused, objection};
+use super::rivals::{MARGIN, rivals};
 use super::search_result::SearchResult;
 use crate::error::ExplainError;
 use crate::fit::candidate::Candidate;
+use crate::fit::kind::STEP;
 use crate::fit::model_variant::AddedEffect;
 use crate::fit::same_form::same_form;
 use crate::run_cache::RunCache;
 use crate::screen::screening_result::ScreeningResult;
 use serde::{Deserialize, Serialize};
 
-/// A rival is tied within this difference in χ², in units of the effective noise.
-const MARGIN: f64 = 6.0;
 /// Correlation of two influences above which no refit can tell their candidates apart.
 pub(crate) const ALIKE: f64 = 0.995;
-/// A rival is tied where the difference in χ² is less than so many of its standard deviations.
-const VUONG: f64 = 1.64;
 /// Fall of χ² by a fully modulated form that the data must allow before a form counts as tested. A form modulated by half makes a
 /// quarter of it, which exceeds the 12 units of the check of the form nine times in ten: 4 (√12 + 1.28)².
 const POWER: f64 = 90.0;
@@ -50,7 +47,7 @@ pub enum Verdict {
 pub(crate) struct Decision {
     /// The verdict.
     pub verdict: Verdict,
-    /// What is named, or the simplest of the tied, or what came nearest.
+    /// What is named, or the best supported of the tied, or what came nearest.
     pub best: Option<usize>,
     /// What came first by rank, and whose form was checked; in a tie it may differ from `best`.
     pub checked: Option<usize>,
@@ -113,15 +110,23 @@ pub(crate) fn decide(
     Ok(Decision { verdict, best: Some(best), checked: Some(checked), tied, rivals, synonyms, because })
 }
 
-/// What is told of a class: the likeliest before any data, then the simplest. What was the best takes its place among the rivals.
-fn shown(found: &SearchResult<'_>, mut best: usize, rivals: &mut [usize]) -> usize {
-    for rival in rivals {
-        let key = |i: usize| (found.judged[i].kinds(), complexity(&found.judged[i]));
-        if key(*rival) < key(best) {
-            std::mem::swap(rival, &mut best);
-        }
+/// What is told of a class. What was the best takes its place among the rivals.
+fn shown(found: &SearchResult<'_>, best: usize, rivals: &mut [usize]) -> usize {
+    let class: Vec<usize> = std::iter::once(best).chain(rivals.iter().copied()).collect();
+    let judged = class.iter().map(|i| &found.judged[*i]);
+    let described: Vec<_> = judged.map(|j| (j.standing(), (j.kinds(), complexity(j)))).collect();
+    let told = class[leading(&described, STEP * found.judged[best].inflation)];
+    if let Some(place) = rivals.iter_mut().find(|i| **i == told) {
+        *place = best;
     }
-    best
+    told
+}
+
+/// The position of what is best supported, the prior included, the first of all; of what comes as near to it as `equal`, the odds of one
+/// kind against the next, that with the least key: the likeliest kind before any data, then the simplest.
+fn leading<K: Ord>(class: &[(f64, K)], equal: f64) -> usize {
+    let near = class.iter().enumerate().filter(|(_, (standing, _))| *standing >= class[0].0 - equal);
+    near.min_by(|(_, a), (_, b)| a.1.cmp(&b.1)).map_or(0, |(i, _)| i)
 }
 
 /// The sets of effects that are tied with what is shown, and its other names, which are no rivals.
@@ -166,6 +171,9 @@ pub(crate) fn limits(judged: &JudgedFit<'_>) -> Vec<String> {
     let mut limits = Vec::new();
     for (m, effect) in variant.effects.iter().enumerate() {
         for (k, parameter) in effect.candidate.def.parameters.iter().enumerate().skip(1) {
+            if parameter.is_rounding {
+                continue;
+            }
             let j = variant.first_entry_of(m) + k;
             // z counts in prior sd.
             let sd = (optimum.covariance()[(j, j)].max(0.0) * judged.inflation).sqrt();
@@ -177,54 +185,7 @@ pub(crate) fn limits(judged: &JudgedFit<'_>) -> Vec<String> {
     limits
 }
 
-/// Other variants that pass the gates and come as close as chance allows: by the fall of χ², or, up to twice that margin,
-/// because the difference of their residuals is not clearly of one sign (Vuong 1989, with the autocorrelation of that
-/// difference).
-fn rivals(cache: &RunCache<'_>, found: &SearchResult<'_>, passing: &[usize], best: usize) -> Vec<usize> {
-    let of_best = &found.judged[best];
-    let size = of_best.fit.variant.effects.len();
-    let near = |i: &usize| {
-        let judged = &found.judged[*i];
-        // Neither the prior nor its absence breaks a tie.
-        let apart = (of_best.rank() - judged.rank()).min(of_best.standing() - judged.standing());
-        *i != best
-            && judged.fit.variant.effects.len() == size
-            && judged.names() != of_best.names()
-            && (apart <= 0.0 || !elaborates(judged, of_best))
-            && (apart < MARGIN * of_best.inflation
-                || (apart < 2.0 * MARGIN * of_best.inflation
-                    && apart < VUONG * scatter(cache, of_best, judged)))
-    };
-    passing.iter().copied().filter(near).collect()
-}
-
-/// Whether a variant of forms that stand for no cause has more values inside its terms than the best: one that does no better with them is an
-/// elaboration of what is told, as a clamp beyond all values is of what it clamps, and no rival of it.
-fn elaborates(judged: &JudgedFit<'_>, best: &JudgedFit<'_>) -> bool {
-    let n_inner = |judged: &JudgedFit<'_>| {
-        let effects = judged.fit.variant.effects.iter();
-        effects.map(|effect| effect.candidate.def.parameters.len().saturating_sub(1)).sum::<usize>()
-    };
-    judged.fit.variant.effects.iter().all(|effect| effect.candidate.kind.is_of_no_field())
-        && n_inner(judged) > n_inner(best)
-}
-
-/// Standard deviation of the difference in χ² of two variants, over all rows.
-fn scatter(cache: &RunCache<'_>, a: &JudgedFit<'_>, b: &JudgedFit<'_>) -> f64 {
-    let rows = &cache.rows;
-    let (of_a, of_b) = (rows.whitened(&a.fit.predicted), rows.whitened(&b.fit.predicted));
-    let variance = |stretch: std::ops::Range<usize>| {
-        let apart: Vec<f64> = stretch.map(|i| of_b[i].powi(2) - of_a[i].powi(2)).collect();
-        let n = apart.len() as f64;
-        let mean = apart.iter().sum::<f64>() / n;
-        let square = apart.iter().map(|d| (d - mean).powi(2)).sum::<f64>();
-        let effective = effective_sample_size(&apart);
-        square * if effective > 0.0 { (n / effective).max(1.0) } else { 1.0 }
-    };
-    rows.stretches().into_iter().map(variance).sum::<f64>().sqrt()
-}
-
-/// Number of operations in the terms of a variant; of tied variants the one with the fewest is shown.
+/// Number of operations in the terms of a variant; of variants that are equal otherwise the one with the fewest is shown.
 fn complexity(judged: &JudgedFit<'_>) -> usize {
     let terms = judged.fit.variant.effects.iter().flat_map(|m| &m.candidate.def.adds);
     let resolve = |_: &str| Some(Slot::Parameter(0));
@@ -267,4 +228,18 @@ fn twins(
         }
     }
     Ok(twins)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_a_tie_the_best_supported_is_told_and_the_simplest_only_of_what_is_equally_so() {
+        // A proposal of two operations beside the best, which has three, and a constant that is far behind.
+        let class = |behind: f64| [(100.0, (1, 3)), (100.0 - behind, (1, 2)), (91.0, (0, 0))];
+        assert_eq!(leading(&class(4.0), STEP), 0);
+        assert_eq!(leading(&class(2.0), STEP), 1);
+        assert_eq!(leading(&class(2.0), 10.0), 2, "in residuals of a larger effective noise all are equal");
+    }
 }
