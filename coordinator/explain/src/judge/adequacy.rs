@@ -127,11 +127,6 @@ impl Adequacy {
         matches!(self.nature(), Nature::Correlated | Nature::Larger)
     }
 
-    /// The size of the noise that the residuals are compared with: the stated one, or their own where it is larger and white.
-    pub(crate) fn level(&self) -> f64 {
-        if self.could_be_white() { self.rmse_over_noise.max(1.0) } else { 1.0 }
-    }
-
     /// The comparison as a sentence without capital and full stop.
     pub(crate) fn says(&self) -> String {
         let size = times(self.rmse_over_noise);

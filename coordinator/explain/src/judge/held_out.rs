@@ -4,6 +4,7 @@
 //! Which of those that fail forbid to name a variant, [`forbidding`] says.
 //! Next files to read: [`super::gates`] for the gates, [`super::uncertainty`] for what the uncertainty explains.
 
+use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 use starlings_estimators::nis_band_of_uncertain_noise;
 
@@ -11,11 +12,11 @@ use super::adequacy::Adequacy;
 use super::uncertainty::Uncertainty;
 use crate::fit::fitted_variant::FittedVariant;
 use crate::number::times;
-use crate::rows::{Row, Usage};
+use crate::rows::{Row, Rows, Usage};
 use crate::run_cache::RunCache;
 
 /// Root mean square over its expectation above which held-out data fail ...
-const FAILS: f64 = 1.25;
+pub(super) const FAILS: f64 = 1.25;
 /// ... and which must also lie outside the band of this probability, which is wider where the noise was found and not given.
 const LEVEL: f64 = 0.9998;
 /// What the uncertainty of the estimate explains is known to first order only: a rest below this share of it is no failure.
@@ -80,7 +81,7 @@ pub(crate) fn held_out(
     if fit.predicted.len() != rows.rows.len() {
         return Vec::new();
     }
-    let level = Adequacy::of(cache, fit).level();
+    let levels = levels(rows, fit.residual(), &Adequacy::of(cache, fit));
     let (before, after) = (rows.whitened(&base.predicted), rows.whitened(&fit.predicted));
     let (scaled_before, scaled_after) = (rows.scaled(&base.predicted), rows.scaled(&fit.predicted));
     let uncertainty = Uncertainty::of(cache, fit);
@@ -91,7 +92,7 @@ pub(crate) fn held_out(
         let (was, is) = (squares(&before), squares(&after));
         let explained = uncertainty.as_ref().map_or(0.0, |of| of.allowance(&at, &after));
         let record = &cache.study.records[row.record];
-        let beyond = (is - explained).max(0.0) / (n * level * level);
+        let beyond = (is - explained).max(0.0) / (n * levels[row.output]);
         let chance = nis_band_of_uncertain_noise(at.len(), row.noise_freedom, LEVEL).1;
         HeldOut {
             record: record.name.clone(),
@@ -106,6 +107,23 @@ pub(crate) fn held_out(
         }
     };
     groups(&rows.rows).into_iter().map(one).collect()
+}
+
+/// The variance of the noise of every output, over the stated one, with which its held-out errors are compared: where the training
+/// residuals could be white, the mean square of its own, or of all where it is never fitted, and at least the stated one. An output
+/// whose sensor, or whose recorded input, is noisier than stated is so on either side of the training span.
+fn levels(rows: &Rows, residual: &DVector<f64>, adequacy: &Adequacy) -> Vec<f64> {
+    let n_output = rows.rows.iter().map(|row| row.output + 1).max().unwrap_or(0);
+    if !adequacy.could_be_white() {
+        return vec![1.0; n_output];
+    }
+    let mut squares = vec![(0.0, 0.0); n_output];
+    for (i, e) in rows.train.iter().zip(residual.iter()) {
+        let (sum, n) = &mut squares[rows.rows[*i].output];
+        (*sum, *n) = (*sum + e * e, *n + 1.0);
+    }
+    let of_all = adequacy.rmse_over_noise.powi(2);
+    squares.into_iter().map(|(sum, n)| if n > 0.0 { sum / n } else { of_all }.max(1.0)).collect()
 }
 
 /// Positions of the rows that no fit sees, by record, channel and use: what lies before the training span and what lies after
@@ -197,6 +215,25 @@ mod tests {
         );
         let span = HeldOut { usage: "held-out".to_owned(), ..channel(17.0, 15.0, 0.9) };
         assert!(forbidding(&correlated, &[span]).is_empty(), "something smaller remains");
+    }
+
+    #[test]
+    fn what_is_held_out_of_an_output_is_compared_with_the_noise_that_its_own_training_rows_show() {
+        let mut rows = Rows::sample(40, |_| Usage::Train);
+        for (i, row) in rows.rows.iter_mut().enumerate() {
+            row.output = i % 2;
+        }
+        rows.rows.push(Row { output: 2, usage: Usage::HeldOutChannel, ..rows.rows[0].clone() });
+        let residual = DVector::from_fn(40, |i, _| if i % 2 == 0 { 1.4 } else { 0.8 });
+        let noise = Adequacy { rmse_over_noise: 1.3_f64.sqrt(), ..residuals(1.0, 0.4) };
+        let of = levels(&rows, &residual, &noise);
+        // The second is quieter than stated, and the third is never fitted.
+        assert!((of[0] - 1.96).abs() < 1e-12 && of[1] == 1.0 && (of[2] - 1.3).abs() < 1e-12, "{of:?}");
+        assert_eq!(
+            levels(&rows, &residual, &residuals(1.1, 1e-9)),
+            [1.0; 3],
+            "correlated residuals are no noise"
+        );
     }
 
     #[test]
