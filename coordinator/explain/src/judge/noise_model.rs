@@ -8,6 +8,7 @@
 use starlings_estimators::{CorrelatedNoise, FittedNoise, Part, Series, fit_noise};
 
 use super::adequacy::Adequacy;
+use super::held_out::FAILS;
 use super::search_result::SearchResult;
 use crate::fit::fitted_variant::FittedVariant;
 use crate::rows::{Rows, Usage};
@@ -61,6 +62,52 @@ pub(crate) fn best_supported(cache: &RunCache<'_>, found: &SearchResult<'_>) -> 
         Adequacy::of_rows(&rows, &fit.predicted).is_gap()
     };
     if is_gap(Vec::new()) && !is_gap(noise.clone()) { noise } else { Vec::new() }
+}
+
+/// A noise with a memory that the stated size excludes and one that was found does not.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct LargerNoise {
+    /// Index of the output.
+    pub output: usize,
+    /// Its sd, over the one that was found.
+    pub factor: f64,
+    /// It, in units of its own variance.
+    pub noise: CorrelatedNoise,
+}
+
+/// The outputs whose noise was found, by differences that take the slow part of a noise for signal, and whose residuals are all noise if
+/// theirs is as large as they are and correlated: white in units of that noise, and no larger where they were held out.
+pub(crate) fn larger(rows: &Rows, predicted: &[f64]) -> Vec<LargerNoise> {
+    let mut rows = Rows { noise: Vec::new(), ..rows.clone() };
+    let scaled = rows.scaled(predicted);
+    let n_output = rows.rows.iter().map(|row| row.output + 1).max().unwrap_or(0);
+    let mut factors = vec![1.0; n_output];
+    for (output, factor) in factors.iter_mut().enumerate() {
+        let of = |i: &usize| rows.rows[*i].output == output && rows.rows[*i].noise_freedom.is_finite();
+        let squares: Vec<f64> = rows.train.iter().filter(|i| of(i)).map(|i| scaled[*i].powi(2)).collect();
+        if !squares.is_empty() {
+            *factor = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt().max(1.0);
+        }
+    }
+    for row in &mut rows.rows {
+        row.noise *= factors[row.output];
+    }
+    rows.noise = of_version(&rows, predicted).noise;
+    if Adequacy::of_rows(&rows, predicted).is_gap() {
+        return Vec::new();
+    }
+    let whitened = rows.whitened(predicted);
+    let is_as_large = |output: usize| {
+        let unseen = (0..rows.rows.len())
+            .filter(|i| rows.rows[*i].output == output && rows.rows[*i].usage == Usage::HeldOut);
+        let squares: Vec<f64> = unseen.map(|i| whitened[i].powi(2)).collect();
+        squares.iter().sum::<f64>() <= FAILS * FAILS * squares.len() as f64
+    };
+    let believed = |(output, noise): (usize, &Option<CorrelatedNoise>)| {
+        let (factor, noise) = (factors[output], (*noise)?);
+        (factor > 1.0 && is_as_large(output)).then_some(LargerNoise { output, factor, noise })
+    };
+    rows.noise.iter().enumerate().filter_map(believed).collect()
 }
 
 /// Whether two noises of every output are the same as far as a search is concerned: their variances and lengths differ by a tenth at
@@ -158,6 +205,31 @@ mod tests {
                 "seed {seed}: a course of the recording"
             );
         }
+    }
+
+    #[test]
+    fn a_noise_that_was_found_may_be_larger_and_correlated_where_one_that_was_stated_may_not() {
+        let n = 550;
+        let mut rows = rows_of(noise(1e-9, 1.0, 1.957_6), n, 3);
+        let zero = vec![0.0; n];
+        for row in &mut rows.rows {
+            row.noise = 0.6;
+        }
+        assert_eq!(larger(&rows, &zero), [], "stated");
+        for row in &mut rows.rows {
+            row.noise_freedom = 100.0;
+        }
+        let [found] = larger(&rows, &zero)[..] else { panic!("not heard") };
+        // Of 550 values some 140 are independent: the sd is known to 6 %, the length to a factor.
+        assert!(
+            (0.6 * found.factor - 1.0).abs() < 0.2 && (found.noise.length / 1.957_6).ln().abs() < 1.0,
+            "{found:?}"
+        );
+        for row in rows.rows.iter_mut().skip(300) {
+            (row.usage, row.observed) = (Usage::HeldOut, row.observed + 2.5);
+        }
+        rows.train.truncate(300);
+        assert_eq!(larger(&rows, &zero), [], "what was held out is no such noise");
     }
 
     #[test]

@@ -5,8 +5,9 @@
 use starlings_study::Study;
 
 use super::result::CorrelatedChannel;
+use crate::judge::noise_model::{LargerNoise, larger as larger_noise};
 use crate::number::{percent, spaced, three};
-use crate::rows::Rows;
+use crate::rows::{Rows, unit};
 
 /// The outputs whose noise counts as correlated.
 pub(crate) fn correlated_noise(study: &Study, rows: &Rows) -> Vec<CorrelatedChannel> {
@@ -24,6 +25,22 @@ impl CorrelatedChannel {
         let length = format!("{}{}", three(self.length), spaced(&self.unit));
         format!("{} over {length} ({} of its variance)", self.channel, percent(self.share))
     }
+}
+
+/// What the model as it is leaves that could be correlated noise, whose size nobody gave, in words with the remedy; `predicted` is by that
+/// model.
+pub(crate) fn larger(study: &Study, rows: &Rows, predicted: &[f64]) -> Vec<String> {
+    let says = |LargerNoise { output, factor, noise }| {
+        let row = rows.rows.iter().find(|row| row.output == output)?;
+        let (name, unit) = (&study.setup.outputs[output], spaced(&unit(study, row.record, row.channel)));
+        let sd = three(factor * row.noise);
+        let length = format!("{}{}", three(noise.length), spaced(&study.time_unit));
+        Some(format!(
+            "what the model as it is leaves of `{name}` could be noise of {sd}{unit} that is correlated over {length}: the noise \
+             that was found leaves out what changes slowly. If the sensor has that, give `noise = {sd}`: only what exceeds it then counts as a gap"
+        ))
+    };
+    larger_noise(rows, predicted).into_iter().filter_map(says).collect()
 }
 
 /// All of them in words; empty without any.

@@ -5,6 +5,7 @@
 use starlings_models::{BuildSetup, SOLVER};
 use starlings_study::Study;
 
+use super::correlated;
 use crate::fit::candidate::Candidate;
 use crate::fit::fitted_variant::FittedVariant;
 use crate::judge::adequacy::Nature;
@@ -114,6 +115,9 @@ pub(crate) fn warnings(cache: &RunCache<'_>, found: &SearchResult<'_>, decision:
             "check the noise: the residuals of the model as it is are {} the stated one",
             times(found.adequacy.rmse_over_noise)
         ));
+    }
+    if decision.verdict == Verdict::Unexplained {
+        list.extend(correlated::larger(cache.study, &cache.rows, &found.base.predicted));
     }
     let best = decision.best.map(|i| &found.judged[i]);
     list.extend(best.and_then(|judged| unfinished(&judged.fit)));
