@@ -93,7 +93,9 @@ pub(crate) fn objection(
         return Some(format!("`{name}` comes nearest, but what was held out still fails with it"));
     }
     if judged.adequacy.could_be_white() {
-        return None;
+        // White residuals larger than the noise may be a noise stated too small, but not the larger part of what is to be explained.
+        let leaves_most = judged.adequacy.is_gap() && judged.share < SHARE;
+        return leaves_most.then(|| takes_only(&name, judged.share, "training data"));
     }
     if judged.kinds().iter().any(|kind| kind.is_of_no_field()) {
         return Some(format!(
@@ -150,15 +152,11 @@ fn correlated(cache: &RunCache<'_>, found: &SearchResult<'_>, judged: &JudgedFit
             100.0 * white
         ));
     }
-    let short = |share: f64, what: &str| {
-        let taken = if share > 0.0 { format!("only {:.0} %", 100.0 * share) } else { "nothing".to_owned() };
-        format!("`{name}` takes away {taken} of the gap on the {what}, and what is left is not noise")
-    };
     if judged.share < SHARE {
-        return Some(short(judged.share, "training data"));
+        return Some(takes_only(&name, judged.share, "training data"));
     }
     if let Some(share) = judged.share_held_out.filter(|s| *s < SHARE_HELD_OUT) {
-        return Some(short(share, "held-out span"));
+        return Some(takes_only(&name, share, "held-out span"));
     }
     let decoys = found.null_distribution.decoys_above(judged.gain);
     (decoys > DECOYS).then(|| {
@@ -167,6 +165,14 @@ fn correlated(cache: &RunCache<'_>, found: &SearchResult<'_>, judged: &JudgedFit
             100.0 * decoys
         )
     })
+}
+
+/// That an effect takes away too small a share of a gap, in words.
+fn takes_only(name: &str, share: f64, what: &str) -> String {
+    let taken = if share > 0.0 { format!("only {:.0} %", 100.0 * share) } else { "nothing".to_owned() };
+    format!(
+        "`{name}` takes away {taken} of the gap on the {what}, and what is left is larger than the noise or correlated"
+    )
 }
 
 /// How much of the gap of the training data an effect takes away, in words.
