@@ -2,7 +2,7 @@
 //!
 //! Next file to read: [`super::held_out`].
 
-use super::adequacy::AS_STATED;
+use super::adequacy::{AS_STATED, Adequacy};
 use super::contribution::SECOND_SHARE;
 use super::form::{Leftover, white_noise, white_share};
 use super::gates::JudgedFit;
@@ -93,9 +93,8 @@ pub(crate) fn objection(
         return Some(format!("`{name}` comes nearest, but what was held out still fails with it"));
     }
     if judged.adequacy.could_be_white() {
-        // White residuals larger than the noise may be a noise stated too small, but not the larger part of what is to be explained.
-        let leaves_most = judged.adequacy.is_gap() && judged.share < SHARE;
-        return leaves_most.then(|| takes_only(&name, judged.share, "training data"));
+        return leaves_most(&judged.adequacy, judged.share)
+            .then(|| takes_only(&name, judged.share, "training data"));
     }
     if judged.kinds().iter().any(|kind| kind.is_of_no_field()) {
         return Some(format!(
@@ -167,6 +166,12 @@ fn correlated(cache: &RunCache<'_>, found: &SearchResult<'_>, judged: &JudgedFit
     })
 }
 
+/// Whether white residuals are a gap again, and the larger part of what was to be explained. Larger than stated may be the noise, but no name
+/// is worth more than what it explains.
+fn leaves_most(adequacy: &Adequacy, share: f64) -> bool {
+    adequacy.could_be_white() && adequacy.is_gap() && share < SHARE
+}
+
 /// That an effect takes away too small a share of a gap, in words.
 fn takes_only(name: &str, share: f64, what: &str) -> String {
     let taken = if share > 0.0 { format!("only {:.0} %", 100.0 * share) } else { "nothing".to_owned() };
@@ -181,5 +186,29 @@ fn takes_away(name: &str, share: f64) -> String {
         format!("`{name}` brings the training data to their noise or below")
     } else {
         format!("`{name}` takes away {:.0} % of the gap", 100.0 * share.max(0.0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn white_residuals_that_are_most_of_a_gap_withhold_a_name_and_noise_stated_too_small_does_not() {
+        let white = |rmse_over_noise: f64| Adequacy {
+            n: 200,
+            rmse_over_noise,
+            whiteness: Some(0.4),
+            inflation: rmse_over_noise.powi(2),
+            over_spread: 0.1,
+            noise_freedom: f64::INFINITY,
+        };
+        assert!(leaves_most(&white(1.4), 0.45));
+        assert!(!leaves_most(&white(1.4), 0.9), "a noise stated too small beside a large gap");
+        assert!(!leaves_most(&white(1.1), 0.45), "noise");
+        assert!(
+            !leaves_most(&Adequacy { whiteness: Some(1e-9), ..white(1.4) }, 0.45),
+            "asked where residuals are correlated"
+        );
     }
 }
