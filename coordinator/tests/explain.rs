@@ -4,11 +4,11 @@
 mod explain_kit;
 mod study_kit;
 
-use explain_kit::{cubic, explained, go, recording, sets, study};
+use explain_kit::{cubic, explained, go, recording, sets, study, watched};
 use starlings_coordinator::explain::{ExplainError, Options, Verdict};
 use starlings_coordinator::fleet::{Fleet, InProcess};
-use starlings_coordinator::study::Study;
 use starlings_coordinator::study::store::Store;
+use starlings_coordinator::study::{Stage, Study};
 use study_kit::Case;
 use study_kit::fleets::{Mortal, Shuffled};
 
@@ -141,7 +141,12 @@ fn a_term_of_the_model_is_swapped_where_only_a_replacement_is_right() {
         "only = [\"coulomb-friction\", \"cubic-stiffness\", \"quadratic-drag\"]",
     );
     let data = recording(&text, &[("coulomb-friction", 0.35)], &[("c", 1e-6)], 5);
-    let found = explained(&text, data).explanation;
+    let case = Case::new(&text, &[("free.csv", data)]);
+    let mut told = Vec::new();
+    let watch = &mut |stage: &Stage| told.push(stage.says.clone());
+    let found = watched(&case, &case.fresh(), &mut InProcess::new(2), &Options::default(), watch);
+    let found = found.unwrap_or_else(|error| panic!("{error}")).explanation;
+    assert!(told.iter().any(|detail| detail.contains("without viscous")), "{told:?}");
     assert!(sets(&found).contains(&vec!["coulomb-friction".to_owned()]), "{}", found.headline);
     let held_out = found.gap.iter().find(|row| row.usage == "held-out").unwrap();
     assert!(held_out.after < 1.2 * held_out.noise, "{held_out:?}");

@@ -4,9 +4,9 @@ use std::path::Path;
 
 use starlings_coordinator::explain::{Context, ExplainError, Explanation, Findings, Options, explain};
 use starlings_coordinator::fleet::{Fleet, InProcess};
-use starlings_coordinator::study::Study;
 use starlings_coordinator::study::store::Store;
 use starlings_coordinator::study::twin::{Twin, simulate};
+use starlings_coordinator::study::{Stage, Study};
 
 use crate::study_kit::{Case, csv, grid};
 
@@ -99,12 +99,23 @@ pub(crate) fn go(
     fleet: &mut dyn Fleet,
     options: &Options,
 ) -> Result<Findings, ExplainError> {
+    watched(case, path, fleet, options, &mut |_| {})
+}
+
+/// The same, and every stage is told.
+pub(crate) fn watched(
+    case: &Case,
+    path: &Path,
+    fleet: &mut dyn Fleet,
+    options: &Options,
+    watch: &mut dyn FnMut(&Stage),
+) -> Result<Findings, ExplainError> {
     let study: Study = case.study();
     std::fs::create_dir_all(path).unwrap();
     let database = path.join("run.db");
     let store =
         if database.exists() { Store::open(&database) } else { Store::create(&database, &[]) }.unwrap();
-    let mut context = Context { clock: &|| 0.0, watch: &mut |_| {}, events: None, earlier_s: 0.0 };
+    let mut context = Context { clock: &|| 0.0, watch, events: None, earlier_s: 0.0 };
     explain(&study, fleet, &store, &mut context, options)
 }
 

@@ -6,7 +6,7 @@
 //! field, and of an instrument's error, which can imitate almost anything, those of every equation that the data feel. Next file to read:
 //! [`crate::judge::verdict`].
 
-use super::search::{Searcher, largest_gain, null_distribution};
+use super::search::Searcher;
 use crate::error::ExplainError;
 use crate::fit::candidate::Candidate;
 use crate::fit::kind::Kind;
@@ -60,14 +60,11 @@ pub(crate) fn search_other_forms<'c>(
     let screening = searcher.screen(&found.base, &points)?;
     let mut near = searcher.best_of_each(&screening);
     near.retain(|h| gain(h) > least);
-    found.screening.extend(screening.iter().cloned());
     let is_any = !near.is_empty();
-    if is_any {
-        found.null_distribution =
-            null_distribution(searcher.cache, &found.base, &found.screening, candidates)?;
-        // As for all terms that were made from the data.
-        found.null_distribution.threshold += 2.0 * found.looked_at.ln();
-        found.largest_gain = largest_gain(&found.screening, candidates);
+    if !is_any {
+        found.screening.extend(screening);
+    } else {
+        searcher.widen(found, screening.clone())?;
         let fits = searcher.race_and_refit(&found.base, &near, &screening)?;
         searcher.judge_all(found, fits)?;
         if found.judged.first().is_some_and(|first| first.leftover.is_none()) {

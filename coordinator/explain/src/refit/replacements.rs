@@ -38,10 +38,10 @@ impl<'c> Searcher<'_, '_, 'c> {
     pub(super) fn replace_terms(&mut self, found: &mut SearchResult<'c>) -> Result<(), ExplainError> {
         let Some(equations) = self.cache.study.setup.model.equations.clone() else { return Ok(()) };
         for term in &equations.replaceable {
-            self.cache.stage("screen", "a term that may be replaced");
+            self.cache.stage("screen", &format!("without {term}, which may be replaced"));
             let Some(gap) = self.gap(&found.base, &equations, term)? else { continue };
             let begun = self.in_place(found, &gap)?;
-            self.cache.stage("refit", &format!("{} effects in place of a term", begun.len()));
+            self.cache.stage("refit", &format!("{} effects in place of {term}", begun.len()));
             let mut fits = self.first_of(begun)?;
             fits.retain(|fit| fit.promised() < found.base.cost());
             if !fits.is_empty() {

@@ -90,11 +90,11 @@ pub(crate) fn search<'c>(
         searcher.cache.foreseen.goes(Course::Open);
         searcher.replace_terms(&mut found)?;
         searcher.second_pass(&mut found, options)?;
-        // What passes the gates may yet be refused, and stand before a pair that would not be.
-        let is_open = found.passing().is_empty()
-            || decide(searcher.cache, &found, candidates)?.verdict == Verdict::Unexplained;
-        if options.max_effects > 1 && is_open {
+        if options.max_effects > 1 && searcher.is_open(&found)? {
             searcher.refit_pairs(&mut found)?;
+            searcher.second_pass(&mut found, options)?;
+        }
+        if searcher.refit_parts(&mut found)? {
             searcher.second_pass(&mut found, options)?;
         }
     }
@@ -123,11 +123,7 @@ pub(crate) fn search_further<'c>(
     searcher.cache.stage("screen", &format!("{}, since no other effect explains the gap", kind.plural()));
     let screening = searcher.screen_all(&found.base)?;
     let best = searcher.best_of_each(&screening);
-    found.screening.extend(screening);
-    found.null_distribution = null_distribution(searcher.cache, &found.base, &found.screening, candidates)?;
-    // The largest of k times as many squares of normal numbers is 2 ln k larger (Fisher and Tippett 1928).
-    found.null_distribution.threshold += 2.0 * found.looked_at.ln();
-    found.largest_gain = largest_gain(&found.screening, candidates);
+    searcher.widen(found, screening)?;
     searcher.refit_singles(found, &best)?;
     searcher.second_pass(found, &Options { max_effects: 1, ..options.clone() })?;
     found.cut_short |= searcher.cut_short || searcher.cache.was_cut_short();
@@ -135,12 +131,12 @@ pub(crate) fn search_further<'c>(
 }
 
 /// Largest fall of χ² in a screening, to first order, with an amplitude of a sign that physics allows.
-pub(super) fn largest_gain(screening: &[ScreeningResult], candidates: &[Candidate]) -> f64 {
+fn largest_gain(screening: &[ScreeningResult], candidates: &[Candidate]) -> f64 {
     screening.iter().map(|h| h.allowed_gain(candidates[h.candidate].sign())).fold(0.0, f64::max)
 }
 
 /// The scores that a search reaches by chance at a fit.
-pub(super) fn null_distribution(
+fn null_distribution(
     cache: &RunCache<'_>,
     fit: &FittedVariant<'_>,
     screening: &[ScreeningResult],
@@ -181,6 +177,27 @@ impl<'c> Searcher<'_, '_, 'c> {
             result.is_significant = self.asked || result.score.gain > LEAST * noise;
         }
         Ok(results)
+    }
+
+    /// Whether nothing that was refitted would be named. What passes the gates may yet be refused, and stand before a pair that would not be.
+    fn is_open(&self, found: &SearchResult<'c>) -> Result<bool, ExplainError> {
+        Ok(found.passing().is_empty()
+            || decide(self.cache, found, self.candidates)?.verdict == Verdict::Unexplained)
+    }
+
+    /// Takes the scores of further candidates into a search, whose chance is then that of all of them.
+    pub(super) fn widen(
+        &self,
+        found: &mut SearchResult<'c>,
+        screening: Vec<ScreeningResult>,
+    ) -> Result<(), ExplainError> {
+        found.screening.extend(screening);
+        found.null_distribution =
+            null_distribution(self.cache, &found.base, &found.screening, self.candidates)?;
+        // The largest of k times as many squares of normal numbers is 2 ln k larger (Fisher and Tippett 1928).
+        found.null_distribution.threshold += 2.0 * found.looked_at.ln();
+        found.largest_gain = largest_gain(&found.screening, self.candidates);
+        Ok(())
     }
 
     /// Refits the best of these candidates, one effect each, and goes on down the list while none of them passes the gates and the next still
