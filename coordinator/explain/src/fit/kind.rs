@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use starlings_models::effect::library::{GENERIC, INSTRUMENTS, family_of};
 
 /// Odds of a kind against the next one, as a fall of χ²: 2 ln 3.
-pub(crate) const STEP: f64 = 2.197_224_577_336_219;
+const STEP: f64 = 2.197_224_577_336_219;
 
 /// Where an effect comes from, the likelier first.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]

@@ -13,7 +13,6 @@ use super::rivals::{MARGIN, rivals};
 use super::search_result::SearchResult;
 use crate::error::ExplainError;
 use crate::fit::candidate::Candidate;
-use crate::fit::kind::STEP;
 use crate::fit::model_variant::AddedEffect;
 use crate::fit::same_form::same_form;
 use crate::run_cache::RunCache;
@@ -115,15 +114,15 @@ fn shown(found: &SearchResult<'_>, best: usize, rivals: &mut [usize]) -> usize {
     let class: Vec<usize> = std::iter::once(best).chain(rivals.iter().copied()).collect();
     let judged = class.iter().map(|i| &found.judged[*i]);
     let described: Vec<_> = judged.map(|j| (j.standing(), (j.kinds(), complexity(j)))).collect();
-    let told = class[leading(&described, STEP * found.judged[best].inflation)];
+    let told = class[leading(&described, MARGIN * found.judged[best].inflation)];
     if let Some(place) = rivals.iter_mut().find(|i| **i == told) {
         *place = best;
     }
     told
 }
 
-/// The position of what is best supported, the prior included, the first of all; of what comes as near to it as `equal`, the odds of one
-/// kind against the next, that with the least key: the likeliest kind before any data, then the simplest.
+/// The position of what is best supported, the prior included, the first of all; of what comes as near to it as `equal`, that with the least
+/// key: the likeliest kind before any data, then the simplest.
 fn leading<K: Ord>(class: &[(f64, K)], equal: f64) -> usize {
     let near = class.iter().enumerate().filter(|(_, (standing, _))| *standing >= class[0].0 - equal);
     near.min_by(|(_, a), (_, b)| a.1.cmp(&b.1)).map_or(0, |(i, _)| i)
@@ -238,8 +237,8 @@ mod tests {
     fn of_a_tie_the_best_supported_is_told_and_the_simplest_only_of_what_is_equally_so() {
         // A proposal of two operations beside the best, which has three, and a constant that is far behind.
         let class = |behind: f64| [(100.0, (1, 3)), (100.0 - behind, (1, 2)), (91.0, (0, 0))];
-        assert_eq!(leading(&class(4.0), STEP), 0);
-        assert_eq!(leading(&class(2.0), STEP), 1);
-        assert_eq!(leading(&class(2.0), 10.0), 2, "in residuals of a larger effective noise all are equal");
+        assert_eq!(leading(&class(7.0), MARGIN), 0);
+        assert_eq!(leading(&class(5.0), MARGIN), 1);
+        assert_eq!(leading(&class(5.0), 10.0), 2, "in residuals of a larger effective noise all are equal");
     }
 }
