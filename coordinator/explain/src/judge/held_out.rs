@@ -223,12 +223,12 @@ mod tests {
         for (i, row) in rows.rows.iter_mut().enumerate() {
             row.output = i % 2;
         }
-        rows.rows.push(Row { output: 2, usage: Usage::HeldOutChannel, ..rows.rows[0].clone() });
+        rows.rows.push(Row { output: 2, usage: Usage::HeldOutChannel, ..rows.rows[0] });
         let residual = DVector::from_fn(40, |i, _| if i % 2 == 0 { 1.4 } else { 0.8 });
         let noise = Adequacy { rmse_over_noise: 1.3_f64.sqrt(), ..residuals(1.0, 0.4) };
         let of = levels(&rows, &residual, &noise);
         // The second is quieter than stated, and the third is never fitted.
-        assert!((of[0] - 1.96).abs() < 1e-12 && of[1] == 1.0 && (of[2] - 1.3).abs() < 1e-12, "{of:?}");
+        assert!(of.iter().zip([1.96, 1.0, 1.3]).all(|(of, want)| (of - want).abs() < 1e-12), "{of:?}");
         assert_eq!(
             levels(&rows, &residual, &residuals(1.1, 1e-9)),
             [1.0; 3],

@@ -61,15 +61,15 @@ pub(crate) fn search_other_forms<'c>(
     let mut near = searcher.best_of_each(&screening);
     near.retain(|h| gain(h) > least);
     let is_any = !near.is_empty();
-    if !is_any {
-        found.screening.extend(screening);
-    } else {
+    if is_any {
         searcher.widen(found, screening.clone())?;
         let fits = searcher.race_and_refit(&found.base, &near, &screening)?;
         searcher.judge_all(found, fits)?;
         if found.judged.first().is_some_and(|first| first.leftover.is_none()) {
             searcher.second_pass(found, &Options { max_effects: 1, ..options.clone() })?;
         }
+    } else {
+        found.screening.extend(screening);
     }
     found.cut_short |= searcher.cut_short || searcher.cache.was_cut_short();
     Ok(is_any)
