@@ -107,6 +107,8 @@ impl LeastSquares {
         self.thorough = true;
         self.trials_left = trials;
         self.rejected = 0;
+        // How far a secant could be trusted, which knew nothing of some components, says nothing of a measured Jacobian.
+        self.radius = f64::INFINITY;
         if self.fresh {
             self.plan();
         } else {

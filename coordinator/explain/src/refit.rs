@@ -1,13 +1,12 @@
 //! The search: refits of the best candidates, then a second pass from the best of them with replacements and pairs.
 //!
-//! Files: [`search`], [`race`], [`ranking`], [`replacements`] of terms, [`pairs`] and [`finite`] where no effect explains the gap alone, [`second_pass`],
-//! [`parts`] of a set that needs no more of it, and [`modulated_forms`], whose effects ask whether the form of an effect is right.
+//! Files: [`search`], [`race`], [`ranking`], [`replacements`] of terms, [`pairs`] and [`finite`] where no effect explains the gap alone, [`second_pass`], and
+//! [`modulated_forms`], whose effects ask whether the form of an effect is right.
 
 mod finite;
 mod modulated_forms;
 pub(crate) mod other_forms;
 mod pairs;
-mod parts;
 mod race;
 mod ranking;
 mod replacements;

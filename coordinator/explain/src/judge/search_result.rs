@@ -40,15 +40,4 @@ impl SearchResult<'_> {
     pub(crate) fn passing(&self) -> Vec<usize> {
         (0..self.judged.len()).filter(|i| self.judged[*i].refusal.is_none()).collect()
     }
-
-    /// Keeps of several fits of one variant, which began at different places, the best.
-    pub(crate) fn keep_best_of_each(&mut self) {
-        let mut kept = Vec::new();
-        self.judged.retain(|judged| {
-            let of = (judged.names(), judged.fit.variant.left_out.clone());
-            let is_new = !kept.contains(&of);
-            kept.push(of);
-            is_new
-        });
-    }
 }

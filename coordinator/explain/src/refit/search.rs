@@ -94,9 +94,6 @@ pub(crate) fn search<'c>(
             searcher.refit_pairs(&mut found)?;
             searcher.second_pass(&mut found, options)?;
         }
-        if searcher.refit_parts(&mut found)? {
-            searcher.second_pass(&mut found, options)?;
-        }
     }
     found.cut_short = searcher.cut_short || searcher.cache.was_cut_short();
     Ok(found)
