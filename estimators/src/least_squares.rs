@@ -50,9 +50,9 @@ pub struct LeastSquares {
 }
 
 impl LeastSquares {
-    /// A fit from a point that was not run yet, or the nearest one within the bounds. It ends when no step promises a fall of the cost (chi-square plus prior) above
-    /// `tolerance`, in units of the mean square of the residuals where that is above one, and what the digits of the cost resolve, or
-    /// after `trials` steps.
+    /// A fit from a point that was not run yet, or the nearest one within the bounds. It ends when no step promises a fall of the cost
+    /// (chi-square plus prior) above `tolerance`, in units of the mean square of the residuals where that is above one, and what the digits
+    /// of the cost resolve, or after `trials` steps.
     pub fn new(mut start: DVector<f64>, prior: Scaled, tolerance: f64, trials: usize) -> Self {
         for (value, [lo, hi]) in start.iter_mut().zip(&prior.bounds) {
             *value = value.max(*lo).min(*hi);
@@ -90,7 +90,9 @@ impl LeastSquares {
         tolerance: f64,
         trials: usize,
     ) -> Self {
-        let mut fit = Self::new(z, prior, tolerance, trials);
+        let mut fit = Self::new(z.clone(), prior, tolerance, trials);
+        // Where the residual is known, within the bounds or not.
+        fit.z = z;
         fit.cost = fit.cost_of(&fit.z, &residual);
         fit.residual = residual;
         fit.jacobian = jacobian;
@@ -107,11 +109,11 @@ impl LeastSquares {
         self.thorough = true;
         self.trials_left = trials;
         self.rejected = 0;
-        // How far a secant could be trusted, which knew nothing of some components, says nothing of a measured Jacobian.
-        self.radius = f64::INFINITY;
         if self.fresh {
             self.plan();
         } else {
+            // How far a secant could be trusted, which knew nothing of some components, says nothing of a measured Jacobian.
+            self.radius = f64::INFINITY;
             self.need = Need::Jacobian(self.z.clone());
         }
     }

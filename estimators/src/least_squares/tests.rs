@@ -89,6 +89,26 @@ fn a_known_start_costs_one_run_per_step_and_no_jacobian() {
 }
 
 #[test]
+fn how_far_a_secant_was_trusted_is_forgotten_where_a_jacobian_is_measured() {
+    let z = DVector::from_vec(vec![1.0, 0.3]);
+    // Both columns zero but for the first of the amplitude: next to nothing is known.
+    let mut known = DMatrix::zeros(20, 2);
+    known[(0, 0)] = 100.0;
+    let mut fit = LeastSquares::from_known(z.clone(), residual(&z), known.into(), flat(2), 0.3, 20);
+    assert_eq!(drive(&mut fit).0, End::Tentative);
+    // As after many steps that brought less than they promised.
+    fit.radius = 1e-6;
+    fit.polish(20);
+    assert_eq!(drive(&mut fit).0, End::Converged);
+    // The residual vanishes at (2, 0.7).
+    assert!(
+        (fit.best().0[0] - 2.0).abs() < 1e-2 && (fit.best().0[1] - 0.7).abs() < 1e-2,
+        "{:?}",
+        fit.best().0
+    );
+}
+
+#[test]
 fn a_parameter_whose_influence_is_not_known_stays_until_it_is_measured() {
     // At amplitude zero the rate moves nothing, and its prior lies far from it.
     let z = DVector::from_vec(vec![0.0, 0.9]);
