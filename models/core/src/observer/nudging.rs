@@ -35,6 +35,9 @@ pub(crate) struct Nudging {
 const MOST: usize = 300;
 /// γΔt beyond which a correction takes the whole innovation, to rounding.
 const WHOLE: f64 = 50.0;
+/// Tenths of a decade below it that are looked at where states have unequal numbers of rows; what is unstable between two of them alone is
+/// not seen.
+const TENTHS: i32 = 80;
 /// Share of the largest eigenvalue below which one is zero: slopes are differences of outputs.
 const ROUNDING: f64 = 1e-6;
 
@@ -102,6 +105,17 @@ impl Nudging {
     }
 }
 
+/// The largest γΔt at which no eigenvalue of 1 − k H is above one in modulus, k = 1 − e^(−nγΔt) of states that all have n rows; `None` where
+/// the whole innovation may be taken.
+fn alike(observation: &DMatrix<f64>, n_row: usize) -> Option<f64> {
+    let eigenvalues = observation.complex_eigenvalues();
+    let largest = eigenvalues.iter().map(|value| value.norm()).fold(0.0, f64::max);
+    // |1 − kλ| ≤ 1 for k ≤ 2 Re λ/|λ|². Of zero, to rounding, are those of states that no output shows.
+    let shown = eigenvalues.iter().filter(|value| value.norm() > ROUNDING * largest);
+    let most = shown.map(|value| (2.0 * value.re / value.norm_sqr()).max(0.0)).reduce(f64::min)?;
+    (most < 1.0).then(|| -(-most).ln_1p() / n_row as f64)
+}
+
 impl Observer for Nudging {
     fn correct(&self, at: Correction<'_>, x: &mut [f64]) {
         for (state, rows) in &self.channels {
@@ -126,17 +140,17 @@ impl Observer for Nudging {
         if observation.iter().any(|slope| !slope.is_finite()) {
             return None;
         }
-        // From gains that hardly pull to those that take the whole innovation.
-        let strengths = (0..=80).map(|k| WHOLE * 10_f64.powf(-0.1 * f64::from(80 - k)));
-        let (mut stable, mut unstable) = (0.0, None);
-        for strength in strengths {
-            if !self.is_stable(&observation, strength) {
-                unstable = Some(strength);
-                break;
-            }
-            stable = strength;
+        let rows = |channel: &(usize, Vec<usize>)| channel.1.len();
+        let n_row = self.channels.first().map(rows)?;
+        if self.channels.iter().all(|channel| rows(channel) == n_row) {
+            return alike(&observation, n_row).map(|strength| strength / dt);
         }
-        let mut unstable = unstable?;
+        // From gains that hardly pull to those that take the whole innovation, tenth of a decade by tenth.
+        let strengths: Vec<f64> =
+            (0..=TENTHS).map(|k| WHOLE * 10_f64.powf(-0.1 * f64::from(TENTHS - k))).collect();
+        let first = strengths.iter().position(|strength| !self.is_stable(&observation, *strength))?;
+        let (mut stable, mut unstable) =
+            (if first == 0 { 0.0 } else { strengths[first - 1] }, strengths[first]);
         while stable > 0.0 && unstable / stable > 1.0 + 1e-9 {
             let middle = f64::midpoint(stable, unstable);
             if self.is_stable(&observation, middle) { stable = middle } else { unstable = middle }
