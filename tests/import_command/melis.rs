@@ -84,16 +84,6 @@ impl Carotid {
         0.9 * self.width / fastest.fold(0.0, f64::max)
     }
 
-    /// The first cell takes the inflow and the characteristic variable u − 4c that comes from within.
-    fn inlet(&mut self, inflow: f64, dt: f64) {
-        let (u, c) = (self.flow[0] / self.area[0], speed(self.area[0]));
-        let next = self.flow[1] / self.area[1] - 4.0 * speed(self.area[1]);
-        let arriving = u - 4.0 * c + (next - (u - 4.0 * c)) * (c - u) * dt / self.width;
-        let velocity = 0.5 * (arriving + (2.0 * inflow / self.area[0] - arriving));
-        self.flow[0] = inflow;
-        self.area[0] = inflow / velocity;
-    }
-
     fn inside(&mut self, dt: f64) {
         let (n, speed) = (self.area.len(), self.width / dt);
         let [before, after] = self.ghosts;
@@ -141,7 +131,8 @@ fn carotid(finer: usize, inflow: &Table) -> Table {
     let mut shown: Vec<Vec<f64>> = vec![Vec::new(); 7];
     while t < 4.01 * period {
         let dt = vessel.step();
-        vessel.inlet(at(inflow, "flow", t.rem_euclid(period)), dt);
+        // Of the first cell the program solves for the area that goes with the flow and its velocity, which is the area that it has.
+        vessel.flow[0] = at(inflow, "flow", t.rem_euclid(period));
         vessel.inside(dt);
         vessel.outlet(dt);
         let last = vessel.area.len() - 1;
@@ -180,18 +171,18 @@ fn what_lies_between_openbf_and_the_model_is_the_grid_of_openbf() {
         let times = theirs["time"].iter().map(|t| t.rem_euclid(1.1)).enumerate();
         (times.map(|(i, t)| other(i, t).powi(2)).sum::<f64>() / theirs["time"].len() as f64).sqrt() / size
     };
-    for (field, letter, unit) in [("pressure", "P", 0.1), ("flow_rate", "Q", 1e-6)] {
+    for (field, letter, unit, alike) in [("pressure", "P", 0.1, 2.5e-4), ("flow_rate", "Q", 1e-6, 6e-4)] {
         for (place, part) in PLACES {
             let values = along(&found, field, [0, 51, 126], part).iter().map(|v| unit * v).collect();
             let own = Table::from([("time".to_owned(), found["time"].clone()), ("v".to_owned(), values)]);
             let name = format!("{letter}_{place}");
             let same = rms(&name, &|i, t| at(&grids[0], &name, t) - theirs[&name][i]);
             // The same scheme, but for where its steps fall.
-            assert!(same < 6e-4, "{name}: the scheme is off openBF by {same}");
+            assert!(same < alike, "{name}: the scheme is off openBF by {same}");
             let [coarse, fine] =
                 [1, 2].map(|k| rms(&name, &|_, t| at(&grids[k], &name, t) - at(&own, "v", t)));
             assert!(
-                fine < 5e-4 && coarse / fine > 1.8,
+                fine < 5e-4 && coarse < 9.5e-4 && coarse / fine > 1.8,
                 "{name}: {coarse} with half of 1 mm, {fine} with a quarter"
             );
             let limit = |t: f64| 2.0 * at(&grids[2], &name, t) - at(&grids[1], &name, t);

@@ -39,7 +39,8 @@ use vessels::Vessels;
 /// The wall's circumferential stress is that of a ring kept from moving along the axis, σ = E (R − R0)/((1 − ν²) R0) + c_w (R0/h) ∂R/∂t.
 ///
 /// At junctions mass is conserved and p + ½ρu² is continuous; at an RCR outlet p = π + R_p Q and C dπ/dt = Q −
-/// (π − p_venous)/R_d. Units are cm, g, s and dyn/cm². The vessels, their Young's moduli E and the outlets are those of the
+/// (π − p_venous)/R_d. A stenosis takes the pressure of Young & Tsai (1973; `artery_1d/stenosis.rs`), and where a segment asks for it the
+/// friction is that of unsteady laminar flow (Womersley 1955, Zielke 1968; `artery_1d/shear.rs`). Units are cm, g, s and dyn/cm². The vessels, their Young's moduli E and the outlets are those of the
 /// [`Layout`].
 pub struct Artery1d {
     spec: Spec,
@@ -57,8 +58,8 @@ enum Fault {
     Node { name: String },
     /// The pressures of all nodes together have no solution.
     Network,
-    /// A stenosis lets nothing through.
-    Closed { name: String, severity: f64 },
+    /// The severity of a stenosis lies outside its range.
+    Severity { name: String, severity: f64 },
 }
 
 impl Fault {
@@ -69,7 +70,7 @@ impl Fault {
                 format!("the flow reaches the speed of its waves in cell {cell} at t = {t}")
             }
             Self::Network => format!("no pressures of its nodes fit the network at t = {t}"),
-            Self::Closed { name, severity } => format!(
+            Self::Severity { name, severity } => format!(
                 "the stenosis `{name}` has a severity of {severity}: give a part of the area from 0 to {}, as by a prior \
                  `logit(0, {0})`; end the vessel in an outlet where nothing passes",
                 stenosis::MOST_SEVERE
@@ -102,16 +103,17 @@ impl Artery1d {
     /// Advances the state over one segment as [`Model::advance`] does, and says what entered and left the network on the way.
     ///
     /// # Errors
-    /// When a vessel collapses or a flow reaches the speed of its waves.
+    /// When an input is not finite, a severity lies outside its range, a vessel collapses or a flow reaches the speed of its waves.
     pub fn advance_counting(
         &self,
         segment: Segment<'_>,
         theta: &[f64],
         x: &mut [f64],
     ) -> Result<Volumes, ModelFailure> {
-        let finite = |value: &f64| value.is_finite();
-        if !(segment.u0.iter().all(finite) && segment.slope.iter().all(finite)) {
-            return Err(ModelFailure::NotFinite { what: self.input_not_finite(segment), time: segment.t0 });
+        let is_bad = |(u, slope): (&f64, &f64)| !(u.is_finite() && slope.is_finite());
+        if let Some(i) = segment.u0.iter().zip(segment.slope).position(is_bad) {
+            let what = format!("input `{}`", Spec::component(&self.spec.inputs, i));
+            return Err(ModelFailure::NotFinite { what, time: segment.t0 });
         }
         let vessels = Vessels::new(&self.network, theta);
         vessels.open().map_err(|fault| fault.at(segment.t0))?;
@@ -136,13 +138,6 @@ impl Artery1d {
             }
         }
         Ok(volumes)
-    }
-
-    /// The input that is not finite.
-    fn input_not_finite(&self, segment: Segment<'_>) -> String {
-        let finite = |(u, slope): (&f64, &f64)| u.is_finite() && slope.is_finite();
-        let found = segment.u0.iter().zip(segment.slope).position(|pair| !finite(pair));
-        format!("input `{}`", Spec::component(&self.spec.inputs, found.unwrap_or_default()))
     }
 
     /// Volume in cm³ that the vessels hold in a state.

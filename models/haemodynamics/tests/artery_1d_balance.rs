@@ -5,11 +5,11 @@ mod artery_1d_kit;
 
 use std::f64::consts::PI;
 
-use artery_1d_kit::{artery, bifurcation, drive, output, outputs, rate, run, start, theta, tube};
-use starlings_haemodynamics::{Artery1d, MODELS};
+use artery_1d_kit::{artery, bifurcation, drive, output, outputs, rate, refused, run, start, theta, tube};
+use starlings_haemodynamics::Artery1d;
 use starlings_models_core::limits::Limits;
 use starlings_models_core::segment::Segment;
-use starlings_models_core::{Model, ModelDef, ModelFailure, SetupError};
+use starlings_models_core::{Model, ModelFailure};
 
 /// A half sine of 0.3 s in every beat of 0.8 s.
 fn beat(t: f64) -> f64 {
@@ -173,15 +173,6 @@ fn a_vessel_that_has_no_waves_is_an_error_and_not_a_step() {
     let error = advance(&model, &theta, &mut x, 0.0).unwrap_err();
     let what = "the speed of waves".to_owned();
     assert_eq!(error, ModelFailure::NotFinite { what, time: 0.0 });
-}
-
-fn refused(layout: &serde_json::Value) -> (String, String) {
-    let def = ModelDef { kind: "artery-1d".to_owned(), layout: Some(layout.clone()), ..ModelDef::default() };
-    let kind = MODELS.iter().find(|kind| kind.kind == "artery-1d").unwrap();
-    match (kind.build)(&def).map(|_| ()) {
-        Err(SetupError::Layout { path, message }) => (path, message),
-        other => panic!("{other:?} for {layout}"),
-    }
 }
 
 #[test]

@@ -187,7 +187,7 @@ fn ends(vessels: &[Vessel]) -> Result<(i64, BTreeSet<i64>), String> {
         [] => Err("no node is only the start of vessels: there is none where the flow enters".to_owned()),
         [first, second, ..] => Err(format!(
             "nodes {first} and {second} are only starts of vessels: the file names one inflow, and does not say what enters \
-             at another; end the vessel from node {second} elsewhere, or give both flows in a study of `artery-1d`"
+             at another; let the vessel from node {second} begin where another one ends, or give both flows in a study of `artery-1d`"
         )),
     }
 }

@@ -10,7 +10,7 @@ use serde::Deserialize;
 pub struct Layout {
     /// The vessels, in the order in which their cells stand in states and outputs.
     pub segments: Vec<Segment>,
-    /// The inlets and the outlets; a node where vessels join need not be listed.
+    /// The inlets, the outlets and the stenoses; a node where vessels join need not be listed.
     pub nodes: Vec<NodeEntry>,
 }
 
@@ -51,7 +51,7 @@ pub struct Segment {
     pub regions: usize,
 }
 
-/// How the blood rubs at the wall.
+/// Shear stress of the blood at the wall.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Friction {
@@ -89,7 +89,7 @@ pub struct NodeEntry {
     pub name: String,
     /// What happens there.
     pub kind: NodeKind,
-    /// Length of a stenosis in cm.
+    /// Length in cm, which a stenosis needs and no other node has.
     pub length: Option<f64>,
 }
 

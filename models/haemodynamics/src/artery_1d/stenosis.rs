@@ -73,7 +73,7 @@ impl Vessels<'_> {
         for (loss, narrowing) in self.losses.iter().zip(&self.network.narrowings) {
             if !(0.0..=MOST_SEVERE).contains(&loss.severity) {
                 let name = self.network.nodes[narrowing.nodes[0]].name.clone();
-                return Err(Fault::Closed { name, severity: loss.severity });
+                return Err(Fault::Severity { name, severity: loss.severity });
             }
         }
         Ok(())

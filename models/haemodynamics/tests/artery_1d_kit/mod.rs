@@ -1,10 +1,10 @@
 //! Arterial networks for tests, and ways to run and read them.
 #![allow(clippy::unwrap_used, dead_code, reason = "test helpers; each test binary uses its part")]
 
-use starlings_haemodynamics::Artery1d;
+use starlings_haemodynamics::{Artery1d, MODELS};
 use starlings_models_core::limits::Limits;
 use starlings_models_core::segment::{Drive, History, Segment};
-use starlings_models_core::{Model, Spec};
+use starlings_models_core::{Model, ModelDef, SetupError, Spec};
 
 struct NoHistory;
 
@@ -146,4 +146,14 @@ pub(crate) fn outputs_inlets(model: &Artery1d, theta: &[f64], x: &[f64], flows: 
 
 pub(crate) fn output(model: &Artery1d, y: &[f64], name: &str) -> f64 {
     y[Spec::offset(&model.spec().outputs, name).unwrap()]
+}
+
+/// Place and message of the refusal of a layout.
+pub(crate) fn refused(layout: &serde_json::Value) -> (String, String) {
+    let def = ModelDef { kind: "artery-1d".to_owned(), layout: Some(layout.clone()), ..ModelDef::default() };
+    let kind = MODELS.iter().find(|kind| kind.kind == "artery-1d").unwrap();
+    match (kind.build)(&def).map(|_| ()) {
+        Err(SetupError::Layout { path, message }) => (path, message),
+        other => panic!("{other:?} for {layout}"),
+    }
 }
