@@ -73,7 +73,7 @@ prior = { transform = "log", median = 0.2, factor = 2.0 }
 name = "dry"
 says = "the mass rubs"
 adds = [ { to = "v", term = "-mu*tanh(v/vs)" } ]
-parameters = [ { name = "mu", unit = "m/s^2", range = [0, 5] }, { name = "vs", grid = [0.01, 0.02, 0.05], range = [0.001, 1] } ]
+parameters = [ { name = "mu", unit = "m/s^2", range = [0, 5] }, { name = "vs", grid = [0.01, 0.02, 0.05], range = [0.001, 1], rounds = true } ]
 
 [[effects]]
 name = "thick"
@@ -187,6 +187,7 @@ fn an_effect_that_the_study_describes_is_not_described_twice() {
         PatchEffect { def: dry(&study), values: vec![value("mu", 0.3, 0.02), value("vs", 0.02, 0.0)] };
     let patched = case.patched(SPRING, &[found], &[]);
     assert_eq!(patched.text.matches("name = \"dry\"").count(), 1);
+    assert!(dry(&study).parameters[1].is_rounding && !dry(&study).parameters[0].is_rounding);
     assert_eq!(patched.setup.effects.len(), 1);
     // It was not estimated, and so it is a constant.
     assert!((patched.setup.model.constants["vs"] - 0.02).abs() < 1e-15);
@@ -232,7 +233,10 @@ fn names_with_dots_and_several_equations_survive() {
         name: "leak:x.v".to_owned(),
         says: "a \"quoted\" sentence".to_owned(),
         adds: vec![add("v", "-q*x*a"), add("position", "0.1*q")],
-        parameters: vec![parameter("q", [f64::NEG_INFINITY, 0.0]), parameter("a", [0.0, 1.0])],
+        parameters: vec![
+            parameter("q", [f64::NEG_INFINITY, 0.0]),
+            EffectParameter { is_rounding: true, ..parameter("a", [0.0, 1.0]) },
+        ],
         ..EffectDef::default()
     };
     let values = vec![value("q", -0.4, 0.1), value("a", 1.0, 0.3)];

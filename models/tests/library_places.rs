@@ -19,9 +19,17 @@ fn a_pressure_outlet_with_a_flow_hosts_a_series_resistance() {
 
 #[test]
 fn an_oscillator_hosts_friction_and_no_series_resistance() {
-    let names: Vec<String> = library(Oscillator::default().spec()).into_iter().map(|e| e.name).collect();
-    assert!(names.contains(&"coulomb-friction".to_owned()), "{names:?}");
-    assert!(!names.contains(&"series-resistance".to_owned()), "{names:?}");
+    let library = library(Oscillator::default().spec());
+    let names: Vec<&str> = library.iter().map(|e| e.name.as_str()).collect();
+    assert!(names.contains(&"coulomb-friction"), "{names:?}");
+    let rounding: Vec<&str> = library
+        .iter()
+        .flat_map(|e| &e.parameters)
+        .filter(|p| p.is_rounding)
+        .map(|p| p.name.as_str())
+        .collect();
+    assert_eq!(rounding, ["v_coulomb", "w_stribeck"]);
+    assert!(!names.contains(&"series-resistance"), "{names:?}");
 }
 
 #[test]

@@ -248,6 +248,8 @@ pub(super) struct EffectParameterSection {
     pub(super) unit: String,
     pub(super) range: Option<[f64; 2]>,
     pub(super) grid: Vec<f64>,
+    /// Whether it is a width over which the term rounds a corner.
+    pub(super) rounds: bool,
 }
 
 /// `[explain]`.

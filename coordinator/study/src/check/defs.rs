@@ -87,6 +87,7 @@ pub(super) fn effect(section: &EffectSection) -> EffectDef {
         unit: p.unit.clone(),
         range: p.range.unwrap_or(EffectParameter::default().range),
         grid: p.grid.clone(),
+        is_rounding: p.rounds,
         ..EffectParameter::default()
     };
     let state = |s: &StateSection| EffectState {

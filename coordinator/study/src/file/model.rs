@@ -246,7 +246,8 @@ fn effect_parameters(effect: &Table<'_>) -> Vec<EffectParameterSection> {
         unit: unit(&t),
         range: t.interval("range").map(Spanned::into_inner),
         grid: t.numbers("grid").into_iter().map(Spanned::into_inner).collect(),
+        rounds: t.flag("rounds").is_some_and(Spanned::into_inner),
     };
-    let keys = ["name", "unit", "range", "grid"];
+    let keys = ["name", "unit", "range", "grid", "rounds"];
     effect.tables("parameters", "a parameter of an effect", &keys).into_iter().map(read).collect()
 }

@@ -25,7 +25,7 @@ use super::{EffectDef, Target};
 use crate::SetupError;
 use crate::{Spec, nearest};
 
-pub use mechanics::SIGN_WIDTHS;
+pub use mechanics::{MOST_SIGN_WIDTH, SIGN_WIDTH};
 use place::Host;
 
 /// Finds every place for one kind of effect in a model.

@@ -94,6 +94,9 @@ fn effect_parameter(parameter: &EffectParameter) -> InlineTable {
     if !parameter.grid.is_empty() {
         table.insert("grid", Value::Array(parameter.grid.iter().copied().collect()));
     }
+    if parameter.is_rounding {
+        table.insert("rounds", true.into());
+    }
     table
 }
 

@@ -29,10 +29,12 @@ pub(super) const GROWERS: &[Grow] = &[
     added_mass,
 ];
 
-/// Parts of a velocity's amplitude over which a dry friction changes its sign: the largest, and the one that is tried. A body that half of
+/// Width of velocity over which a dry friction changes its sign, in amplitudes of the velocity, that is tried first. A body that half of
 /// the friction holds at rest creeps with half of this width (tanh⁻¹ ½ = 0.55), so that recordings of small noise tell it: a wrong one
 /// would be made up for by a friction that fades, or limits itself.
-pub const SIGN_WIDTHS: [f64; 2] = [0.05, 0.02];
+pub const SIGN_WIDTH: f64 = 0.02;
+/// The largest such width, in amplitudes of the velocity.
+pub const MOST_SIGN_WIDTH: f64 = 0.05;
 
 /// A displacement with the velocity that changes it.
 struct Spring<'a> {
@@ -85,8 +87,7 @@ fn coulomb_friction(host: Host<'_>) -> Vec<EffectDef> {
 fn sign_width(draft: Draft, velocity: &Quantity, name: &str) -> Draft {
     let scale = Scale::Amplitude(velocity.name.clone());
     let says = "Velocity within which the friction changes its sign.";
-    let [most, tried] = SIGN_WIDTHS;
-    draft.rounding(name, &velocity.unit, ([0.0, most], tried), scale, says)
+    draft.rounding(name, &velocity.unit, ([0.0, MOST_SIGN_WIDTH], SIGN_WIDTH), scale, says)
 }
 
 /// What dry friction has more near rest, −f sign(v) exp(−(v/v₀)²).
