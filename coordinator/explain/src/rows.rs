@@ -77,6 +77,27 @@ pub struct Rows {
 }
 
 impl Rows {
+    /// Number of outputs that rows compare, or that stand before one of them.
+    pub(crate) fn n_output(&self) -> usize {
+        self.rows.iter().map(|row| row.output + 1).max().unwrap_or(0)
+    }
+
+    /// The mean square of the values, one for each row, of every output over the training rows that count; `None` for an output with fewer
+    /// than `least` of them.
+    pub(crate) fn mean_squares(
+        &self,
+        values: &[f64],
+        least: usize,
+        counts: impl Fn(&Row) -> bool,
+    ) -> Vec<Option<f64>> {
+        let mut sums = vec![(0.0, 0_usize); self.n_output()];
+        for &i in self.train.iter().filter(|i| counts(&self.rows[**i])) {
+            let (sum, n) = &mut sums[self.rows[i].output];
+            (*sum, *n) = (*sum + values[i] * values[i], *n + 1);
+        }
+        sums.into_iter().map(|(sum, n)| (n >= least).then(|| sum / n as f64)).collect()
+    }
+
     /// The rows of a study. Missing values have none.
     pub fn new(study: &Study) -> Self {
         let channels = || study.records.iter().flat_map(|record| &record.channels);

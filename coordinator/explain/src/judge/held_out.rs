@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use starlings_estimators::nis_band_of_uncertain_noise;
 
 use super::adequacy::Adequacy;
+use super::noise_model::LEAST;
 use super::uncertainty::Uncertainty;
 use crate::fit::fitted_variant::FittedVariant;
 use crate::number::times;
@@ -110,20 +111,19 @@ pub(crate) fn held_out(
 }
 
 /// The variance of the noise of every output, over the stated one, with which its held-out errors are compared: where the training
-/// residuals could be white, the mean square of its own, or of all where it is never fitted, and at least the stated one. An output
-/// whose sensor, or whose recorded input, is noisier than stated is so on either side of the training span.
+/// residuals could be white, the mean square of its own, or of all where too few of its values are fitted to tell, and at least the
+/// stated one. An output whose sensor, or whose recorded input, is noisier than stated is so on either side of the training span.
 fn levels(rows: &Rows, residual: &DVector<f64>, adequacy: &Adequacy) -> Vec<f64> {
-    let n_output = rows.rows.iter().map(|row| row.output + 1).max().unwrap_or(0);
     if !adequacy.could_be_white() {
-        return vec![1.0; n_output];
+        return vec![1.0; rows.n_output()];
     }
-    let mut squares = vec![(0.0, 0.0); n_output];
+    let mut of_row = vec![0.0; rows.rows.len()];
     for (i, e) in rows.train.iter().zip(residual.iter()) {
-        let (sum, n) = &mut squares[rows.rows[*i].output];
-        (*sum, *n) = (*sum + e * e, *n + 1.0);
+        of_row[*i] = *e;
     }
     let of_all = adequacy.rmse_over_noise.powi(2);
-    squares.into_iter().map(|(sum, n)| if n > 0.0 { sum / n } else { of_all }.max(1.0)).collect()
+    let own = rows.mean_squares(&of_row, LEAST, |_| true);
+    own.into_iter().map(|square| square.unwrap_or(of_all).max(1.0)).collect()
 }
 
 /// Positions of the rows that no fit sees, by record, channel and use: what lies before the training span and what lies after
@@ -224,14 +224,20 @@ mod tests {
             row.output = i % 2;
         }
         rows.rows.push(Row { output: 2, usage: Usage::HeldOutChannel, ..rows.rows[0] });
-        let residual = DVector::from_fn(40, |i, _| if i % 2 == 0 { 1.4 } else { 0.8 });
+        // One value of a fourth, far off, tells no noise.
+        rows.rows.push(Row { output: 3, ..rows.rows[0] });
+        rows.train.push(41);
+        let residual = DVector::from_fn(41, |i, _| [1.4, 0.8, 4.0][if i == 40 { 2 } else { i % 2 }]);
         let noise = Adequacy { rmse_over_noise: 1.3_f64.sqrt(), ..residuals(1.0, 0.4) };
         let of = levels(&rows, &residual, &noise);
         // The second is quieter than stated, and the third is never fitted.
-        assert!(of.iter().zip([1.96, 1.0, 1.3]).all(|(of, want)| (of - want).abs() < 1e-12), "{of:?}");
+        assert!(
+            of.len() == 4 && of.iter().zip([1.96, 1.0, 1.3, 1.3]).all(|(of, want)| (of - want).abs() < 1e-12),
+            "{of:?}"
+        );
         assert_eq!(
             levels(&rows, &residual, &residuals(1.1, 1e-9)),
-            [1.0; 3],
+            [1.0; 4],
             "correlated residuals are no noise"
         );
     }

@@ -11,7 +11,7 @@ use super::adequacy::Adequacy;
 use super::held_out::FAILS;
 use super::search_result::SearchResult;
 use crate::fit::fitted_variant::FittedVariant;
-use crate::rows::{Rows, Usage};
+use crate::rows::{Row, Rows, Usage};
 use crate::run_cache::RunCache;
 
 /// Odds at which correlated noise is believed against the others, as a logarithm: 1000 to 1.
@@ -20,7 +20,7 @@ const BELIEVED: f64 = 6.907_755;
 const MOST: usize = 5;
 /// Values of a channel that tell its correlation at least, as in the test of whiteness, and lengths of that correlation that the data
 /// must hold: what changes more slowly is a course of the recording, in which a missing effect would be lost.
-const LEAST: usize = 20;
+pub(super) const LEAST: usize = 20;
 
 /// The noise of one version, output by output.
 struct VersionNoise {
@@ -80,16 +80,10 @@ pub(crate) struct LargerNoise {
 pub(crate) fn larger(rows: &Rows, predicted: &[f64]) -> Vec<LargerNoise> {
     let mut rows = Rows { noise: Vec::new(), ..rows.clone() };
     let scaled = rows.scaled(predicted);
-    let n_output = rows.rows.iter().map(|row| row.output + 1).max().unwrap_or(0);
-    let mut factors = vec![1.0; n_output];
-    for (output, factor) in factors.iter_mut().enumerate() {
-        let of = |i: &usize| rows.rows[*i].output == output && rows.rows[*i].noise_freedom.is_finite();
-        let squares: Vec<f64> = rows.train.iter().filter(|i| of(i)).map(|i| scaled[*i].powi(2)).collect();
-        if !squares.is_empty() {
-            *factor = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt().max(1.0);
-        }
-    }
-    for row in &mut rows.rows {
+    let found = |row: &Row| row.noise_freedom.is_finite();
+    let shown = rows.mean_squares(&scaled, 1, found);
+    let factors: Vec<f64> = shown.iter().map(|square| square.map_or(1.0, |s| s.sqrt().max(1.0))).collect();
+    for row in rows.rows.iter_mut().filter(|row| found(row)) {
         row.noise *= factors[row.output];
     }
     rows.noise = of_version(&rows, predicted).noise;
@@ -123,7 +117,7 @@ pub(crate) fn alike(a: &[Option<CorrelatedNoise>], b: &[Option<CorrelatedNoise>]
 }
 
 fn of_version(rows: &Rows, predicted: &[f64]) -> VersionNoise {
-    let n_output = rows.rows.iter().map(|row| row.output + 1).max().unwrap_or(0);
+    let n_output = rows.n_output();
     let scaled = rows.scaled(predicted);
     let mut version = VersionNoise { log_density: 0.0, noise: vec![None; n_output] };
     for output in 0..n_output {
@@ -225,6 +219,28 @@ mod tests {
             (0.6 * found.factor - 1.0).abs() < 0.2 && (found.noise.length / 1.957_6).ln().abs() < 1.0,
             "{found:?}"
         );
+        // A second record whose noise of the same output was stated: larger residuals there are a gap.
+        let mut beside = rows.clone();
+        beside.rows.extend(rows.rows.iter().map(|row| Row {
+            record: 1,
+            noise_freedom: f64::INFINITY,
+            ..*row
+        }));
+        beside.train = (0..2 * n).collect();
+        assert_eq!(larger(&beside, &vec![0.0; 2 * n]), [], "one of them stated");
+        // A second output with a slow gap above its stated noise.
+        let slow = |i: usize| 4.0 * (0.05 * i as f64).sin();
+        let other = |(i, row): (usize, &Row)| Row {
+            output: 1,
+            channel: 1,
+            observed: slow(i),
+            noise: 1.0,
+            noise_freedom: f64::INFINITY,
+            ..*row
+        };
+        beside.rows.truncate(n);
+        beside.rows.extend(rows.rows.iter().enumerate().map(other));
+        assert_eq!(larger(&beside, &vec![0.0; 2 * n]), [], "not all is noise");
         for row in rows.rows.iter_mut().skip(300) {
             (row.usage, row.observed) = (Usage::HeldOut, row.observed + 2.5);
         }

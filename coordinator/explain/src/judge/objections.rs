@@ -2,7 +2,7 @@
 //!
 //! Next file to read: [`super::held_out`].
 
-use super::adequacy::{AS_STATED, Adequacy};
+use super::adequacy::{AS_STATED, Adequacy, Nature};
 use super::contribution::SECOND_SHARE;
 use super::form::{Leftover, white_noise, white_share};
 use super::gates::JudgedFit;
@@ -94,7 +94,7 @@ pub(crate) fn objection(
     }
     if judged.adequacy.could_be_white() {
         return leaves_most(&judged.adequacy, judged.share)
-            .then(|| takes_only(&name, judged.share, "training data"));
+            .then(|| takes_only(&name, judged.share, "training data", "larger than the noise"));
     }
     if judged.kinds().iter().any(|kind| kind.is_of_no_field()) {
         return Some(format!(
@@ -152,10 +152,10 @@ fn correlated(cache: &RunCache<'_>, found: &SearchResult<'_>, judged: &JudgedFit
         ));
     }
     if judged.share < SHARE {
-        return Some(takes_only(&name, judged.share, "training data"));
+        return Some(takes_only(&name, judged.share, "training data", "correlated"));
     }
     if let Some(share) = judged.share_held_out.filter(|s| *s < SHARE_HELD_OUT) {
-        return Some(takes_only(&name, share, "held-out span"));
+        return Some(takes_only(&name, share, "held-out span", "correlated"));
     }
     let decoys = found.null_distribution.decoys_above(judged.gain);
     (decoys > DECOYS).then(|| {
@@ -169,15 +169,13 @@ fn correlated(cache: &RunCache<'_>, found: &SearchResult<'_>, judged: &JudgedFit
 /// Whether white residuals are a gap again, and the larger part of what was to be explained. Larger than stated may be the noise, but no name
 /// is worth more than what it explains.
 fn leaves_most(adequacy: &Adequacy, share: f64) -> bool {
-    adequacy.could_be_white() && adequacy.is_gap() && share < SHARE
+    adequacy.nature() == Nature::Larger && share < SHARE
 }
 
 /// That an effect takes away too small a share of a gap, in words.
-fn takes_only(name: &str, share: f64, what: &str) -> String {
+fn takes_only(name: &str, share: f64, what: &str, left: &str) -> String {
     let taken = if share > 0.0 { format!("only {:.0} %", 100.0 * share) } else { "nothing".to_owned() };
-    format!(
-        "`{name}` takes away {taken} of the gap on the {what}, and what is left is larger than the noise or correlated"
-    )
+    format!("`{name}` takes away {taken} of the gap on the {what}, and what is left is {left}")
 }
 
 /// How much of the gap of the training data an effect takes away, in words.

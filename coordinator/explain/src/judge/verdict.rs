@@ -121,11 +121,12 @@ fn shown(found: &SearchResult<'_>, best: usize, rivals: &mut [usize]) -> usize {
     told
 }
 
-/// The position of what is best supported, the prior included, the first of all; of what comes as near to it as `equal`, that with the least
-/// key: the likeliest kind before any data, then the simplest.
+/// The position of what is best supported, the prior included; of what comes as near to it as `equal`, that with the least key: the likeliest
+/// kind before any data, then the simplest, then the better supported.
 fn leading<K: Ord>(class: &[(f64, K)], equal: f64) -> usize {
-    let near = class.iter().enumerate().filter(|(_, (standing, _))| *standing >= class[0].0 - equal);
-    near.min_by(|(_, a), (_, b)| a.1.cmp(&b.1)).map_or(0, |(i, _)| i)
+    let most = class.iter().map(|(standing, _)| *standing).fold(f64::NEG_INFINITY, f64::max);
+    let near = class.iter().enumerate().filter(|(_, (standing, _))| *standing >= most - equal);
+    near.min_by(|(_, a), (_, b)| a.1.cmp(&b.1).then(b.0.total_cmp(&a.0))).map_or(0, |(i, _)| i)
 }
 
 /// The sets of effects that are tied with what is shown, and its other names, which are no rivals.
@@ -239,6 +240,9 @@ mod tests {
         let class = |behind: f64| [(100.0, (1, 3)), (100.0 - behind, (1, 2)), (91.0, (0, 0))];
         assert_eq!(leading(&class(7.0), MARGIN), 0);
         assert_eq!(leading(&class(5.0), MARGIN), 1);
+        // What a pair ended in may stand behind another single effect.
+        assert_eq!(leading(&class(-7.0), MARGIN), 1);
+        assert_eq!(leading(&[(90.0, 0), (93.0, 0)], MARGIN), 1, "of two that are equal otherwise");
         assert_eq!(leading(&class(5.0), 10.0), 2, "in residuals of a larger effective noise all are equal");
     }
 }

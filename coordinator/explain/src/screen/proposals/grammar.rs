@@ -4,7 +4,7 @@
 //! scale takes it from the course of its quantity. A factor of constant sign has no direction and no size of its own. Next file to
 //! read: [`super`].
 
-use starlings_models::effect::library::SIGN_WIDTHS;
+use starlings_models::effect::library::{MOST_SIGN_WIDTH, SIGN_WIDTH};
 use starlings_models::effect::{Addition, EffectParameter};
 use starlings_models::units::Unit;
 use starlings_models::{EffectDef, Quantity, Role};
@@ -73,6 +73,19 @@ pub(super) fn grammar(study: &Study, state: &str, tracks: &[Track]) -> Vec<Effec
     equation.made
 }
 
+/// A parameter inside a term: where it may lie, where it is tried, and whether it rounds a corner.
+struct Inner {
+    range: [f64; 2],
+    grid: Vec<f64>,
+    is_rounding: bool,
+}
+
+impl Inner {
+    fn new(range: [f64; 2], grid: &[f64]) -> Self {
+        Self { range, grid: grid.to_vec(), is_rounding: false }
+    }
+}
+
 impl Equation<'_> {
     /// The terms of one quantity.
     fn of_one(&mut self, q: &Signal<'_>) {
@@ -91,8 +104,11 @@ impl Equation<'_> {
             let square = format!("goes with the square of {x} and has its sign");
             self.add("odd-square", &[(q, 2.0)], 0.0, &square, |k| format!("{k}*{x}*abs({x})"));
             // As a dry friction of the library, so that the two are known as one effect.
-            let [most, tried] = SIGN_WIDTHS.map(|share| share * q.swing());
-            self.with_inner(q, "direction", [0.0, most], vec![tried], |k, h| {
+            let width = Inner {
+                is_rounding: true,
+                ..Inner::new([0.0, MOST_SIGN_WIDTH * q.swing()], &[SIGN_WIDTH * q.swing()])
+            };
+            self.with_inner((q, 0.0), "direction", width, |k, h| {
                 (format!("{k}*tanh({x}/{h})"), format!("has one size and the sign of {x}"))
             });
             let size = format!("goes with the size of {x}, whatever its sign");
@@ -100,19 +116,17 @@ impl Equation<'_> {
             let clamped = |k: &str, h: &str| {
                 (format!("{k}*max(min({x}, {h}), -{h})"), format!("goes with {x} and stays at a limit"))
             };
-            let range = [0.02 * q.swing(), q.swing()];
-            self.with_inner(q, "clamped", range, [0.2, 0.5].map(|s| s * q.swing()).to_vec(), clamped);
+            let limit = Inner::new([0.02 * q.swing(), q.swing()], &[0.2, 0.5].map(|s| s * q.swing()));
+            self.with_inner((q, 1.0), "clamped", limit, clamped);
         }
         if !own {
-            self.with_inner(
-                q,
-                "limited",
-                [0.02 * q.swing(), 5.0 * q.swing()],
-                [0.2, 0.8].map(|s| s * q.swing()).to_vec(),
-                |k, h| (format!("{k}*{x}/({h} + abs({x}))"), format!("goes with {x} up to a limit")),
-            );
+            let half = Inner::new([0.02 * q.swing(), 5.0 * q.swing()], &[0.2, 0.8].map(|s| s * q.swing()));
+            self.with_inner((q, 0.0), "limited", half, |k, h| {
+                (format!("{k}*{x}/({h} + abs({x}))"), format!("goes with {x} up to a limit"))
+            });
             let at = |share: f64| q.ends[0] + 2.0 * share * q.swing();
-            self.with_inner(q, "beyond", q.ends, [0.25, 0.5, 0.75].map(at).to_vec(), |k, h| {
+            let threshold = Inner::new(q.ends, &[0.25, 0.5, 0.75].map(at));
+            self.with_inner((q, 1.0), "beyond", threshold, |k, h| {
                 (format!("{k}*max({x} - {h}, 0)"), format!("goes with what {x} exceeds a threshold by"))
             });
         }
@@ -154,21 +168,18 @@ impl Equation<'_> {
         self.push(name, says, term(&amplitude), vec![parameter(&amplitude, unit)]);
     }
 
-    /// A term with a parameter inside, in the unit of its quantity.
+    /// A term with a parameter inside, in the unit of its quantity; the amplitude's unit is that of the rate over so many powers of it.
     fn with_inner(
         &mut self,
-        q: &Signal<'_>,
+        (q, power): (&Signal<'_>, f64),
         stem: &str,
-        range: [f64; 2],
-        grid: Vec<f64>,
+        Inner { range, grid, is_rounding }: Inner,
         term: impl Fn(&str, &str) -> (String, String),
     ) {
         let told = [self.state.name.as_str(), q.name()];
         let (amplitude, inner) = (coefficient("k", stem, &told), coefficient("at", stem, &told));
         let (text, says) = term(&amplitude, &inner);
-        let power = if ["limited", "direction"].contains(&stem) { 0.0 } else { 1.0 };
         let unit = self.unit(&[(q.of.unit.as_str(), power)]);
-        let is_rounding = stem == "direction";
         let inside = EffectParameter { range, grid, is_rounding, ..parameter(&inner, q.of.unit.clone()) };
         self.push(
             format!("{stem}:{}", told.join(":")),
