@@ -196,6 +196,18 @@ mod tests {
     }
 
     #[test]
+    fn kinds_that_are_done_at_once_share_the_time_as_they_should() {
+        let mut pace = Pace::default();
+        let of = |done: f64, left: [f64; 2]| {
+            let part = |weight, left| Part { takes: Takes::Runs(weight), done, left };
+            Work { parts: vec![part(1.0, left[0]), part(0.4, left[1])], at: 0, next: 0.0, ends: true }
+        };
+        pace.at(0.0, &of(0.0, [10.0, 20.0]));
+        // Ten of both in ten seconds: 10/14 s and 4/14 s each.
+        assert!((left(&mut pace, 10.0, &of(10.0, [0.0, 10.0])) - 40.0 / 14.0).abs() < 1e-9);
+    }
+
+    #[test]
     fn between_two_looks_the_time_left_falls_with_time_and_no_further_than_work_that_is_late() {
         let mut pace = ten();
         assert!((left(&mut pace, 10.0, &of(10.0)) - 20.0).abs() < 1e-9);
