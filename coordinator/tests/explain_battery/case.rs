@@ -139,6 +139,10 @@ pub struct Result {
     pub named: String,
     /// What was told as a probability, with whether it is so: of every set that it is the truth alone, and that the truth is none of them.
     pub told: Vec<(f64, bool)>,
+    /// Probability that was told of *none of these*.
+    pub none: f64,
+    /// Of what is left: root mean square over the noise, probability of its correlation in white noise, effective variance, share of the gap.
+    pub left: [f64; 4],
     /// χ² of the model with what was named, refitted to data without noise: below a few units the data hold nothing against it.
     pub rival: Option<f64>,
     /// What became of the true effect in the search: its fate among the screened, or why it was refused.

@@ -73,6 +73,8 @@ pub fn one(world: &World<'_>, case: &Case) -> Option<Result> {
         estimate: None,
         named: String::new(),
         told: Vec::new(),
+        none: f64::NAN,
+        left: [f64::NAN; 4],
         rival: None,
         truth: String::new(),
         n_inner: draw.effect.as_ref().map_or(0, |(_, values)| values.len() - 1),
@@ -112,6 +114,8 @@ fn judged(base: Result, found: &Explanation, draw: &Draw, world: &World<'_>, noi
         outcome: Outcome::of(found, &base.case.accepted),
         named: if found.effects.is_empty() { found.headline.clone() } else { named.join(" | ") },
         told: told(found, &base.case),
+        none: found.probabilities.as_ref().map_or(f64::NAN, |of| of.none_of_these),
+        left: left(found),
         truth: truth(found, &base.case.accepted),
         replaced: found.replaced.len(),
         runs: found.runs,
@@ -143,6 +147,13 @@ fn truth(found: &Explanation, accepted: &[String]) -> String {
     let refused = found.rejected.iter().filter(|r| is_right(&r.name));
     let refused = refused.map(|r| format!("{} refused by {}: {}", r.name, r.gate, r.reason));
     fates.chain(refused).collect::<Vec<_>>().join("; ")
+}
+
+/// What the residuals with what was named look like, and the share of the gap in them.
+fn left(found: &Explanation) -> [f64; 4] {
+    let of = &found.remaining;
+    let share = found.probabilities.as_ref().map_or(f64::NAN, |told| told.discrepancy);
+    [of.rmse_over_noise, of.whiteness_p, of.inflation, share]
 }
 
 /// The probabilities that were told, with what is so.

@@ -183,14 +183,14 @@ fn in_words(library: &Group<'_>, left_out: &Group<'_>) -> String {
 /// One line per case.
 pub fn csv(results: &[Result], systems: &[System]) -> String {
     let mut text = String::from(
-        "system,kind,effect,noise,rho,n,seed,auto,lambda,outcome,named,rival,replaced,amplitude,estimate,lo,hi,held_out,runs,false_alarm,wall_s,truth\n",
+        "system,kind,effect,noise,rho,n,seed,auto,lambda,outcome,named,rival,replaced,amplitude,estimate,lo,hi,held_out,runs,false_alarm,wall_s,none,rmse,white_p,inflation,left,truth\n",
     );
     for r in results {
         let (estimate, [lo, hi]) = r.estimate.unwrap_or((f64::NAN, [f64::NAN; 2]));
         let case = &r.case;
         writeln!(
             text,
-            "{},{},{},{},{},{},{},{},{:.4e},{},\"{}\",{:.3e},{},{:e},{estimate:e},{lo:e},{hi:e},{:.4},{},{:.4},{:.3},\"{}\"",
+            "{},{},{},{},{},{},{},{},{:.4e},{},\"{}\",{:.3e},{},{:e},{estimate:e},{lo:e},{hi:e},{:.4},{},{:.4},{:.3},{:.3},{:.3},{:.2e},{:.2},{:.3},\"{}\"",
             systems[case.system].name,
             case.kind.word(),
             case.effect.as_deref().unwrap_or(""),
@@ -209,6 +209,11 @@ pub fn csv(results: &[Result], systems: &[System]) -> String {
             r.runs,
             r.false_alarm,
             r.wall_s,
+            r.none,
+            r.left[0],
+            r.left[1],
+            r.left[2],
+            r.left[3],
             r.truth.replace('"', "'"),
         )
         .unwrap();
