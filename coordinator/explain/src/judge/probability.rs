@@ -110,8 +110,8 @@ pub(crate) fn probabilities(
     weights.retain(|(set, _)| !decision.synonyms.contains(&set.names.join(" + ")));
     let of_verdict = odds * UNLISTED / (1.0 - UNLISTED);
     let listed = 1.0 / (1.0 + of_verdict);
-    // Where what is left is a gap again, correlated or larger than the noise, so much of the gap is in no list.
-    let is_left = is_answered && best.is_some_and(|j| j.adequacy.is_gap());
+    // Where what is left may be a gap again, correlated or larger than chance leaves the noise, so much of the gap is in no list.
+    let is_left = is_answered && best.is_some_and(|j| j.adequacy.may_hide_a_gap());
     Some(shared(weights, if is_left { listed * (1.0 - discrepancy) } else { listed }, discrepancy))
 }
 
