@@ -83,3 +83,81 @@ fn a_threshold_is_found_where_the_fit_without_it_has_bent_all_parameters() {
         assert!(found.gap.iter().all(|row| row.after < 1.2 * row.noise), "{seed}: {:?}", found.gap);
     }
 }
+
+/// A rocket motor of steady burning area, integrated in steps of a fifth of its sampling interval.
+const MOTOR: &str = r#"
+[study]
+name = "motor"
+
+[model]
+kind = "equations"
+constants = { At = 1.0 }
+roles = { At = "throat-area", a = "burn-rate" }
+outputs = [
+  { name = "pressure", role = "pressure", value = "p" },
+  { name = "thrust", role = "thrust", value = "Cf*At*p" },
+]
+solver = { method = "fixed", step = 0.004 }
+
+[[model.states]]
+name = "p"
+role = "pressure"
+initial = 0.3
+rate = { gas = "25*a*max(p, 0)^n", nozzle = "-25*At*p" }
+
+[[parameters]]
+name = "a"
+prior = { transform = "log", median = 1.0, factor = 1.12 }
+
+[[parameters]]
+name = "n"
+prior = { transform = "linear", median = 0.35, sd = 0.04 }
+
+[[parameters]]
+name = "Cf"
+prior = { transform = "log", median = 1.5, factor = 1.08 }
+
+[[records]]
+name = "firing"
+file = "firing.csv"
+channels = [
+  { column = "p", output = "pressure", noise = 0.005 },
+  { column = "F", output = "thrust", noise = 0.007 },
+]
+train = [0, 3]
+
+[explain]
+library = "all"
+"#;
+
+/// Four seconds in which the throat widens by 3 % at an instant.
+fn firing(at: f64, seed: u64) -> String {
+    let n = 200;
+    let noise = normals(2 * n, seed);
+    let area = |t: f64| if t < at { 1.0 } else { 1.03 };
+    let (mut p, mut rows) = (0.3_f64, [Vec::new(), Vec::new()]);
+    for k in 0..n {
+        let t = 0.02 * k as f64;
+        rows[0].push(p + 0.005 * noise[2 * k]);
+        rows[1].push(1.45 * area(t) * p + 0.007 * noise[2 * k + 1]);
+        for i in 0..40 {
+            let rate = |p: f64| 25.0 * (0.98 * p.powf(0.34) - area(t + 0.000_5 * (f64::from(i) + 0.5)) * p);
+            p += 0.000_5 * rate(p + 0.000_25 * rate(p));
+        }
+    }
+    csv("time,p,F", &[&grid(n, 0.02), &rows[0], &rows[1]])
+}
+
+#[test]
+fn an_instant_is_found_where_no_difference_within_a_step_of_the_integration_shows_it() {
+    // Within a step of 0.004 the place of the instant changes nothing, and a thousandth of its prior is less than that.
+    for (at, seed) in [(1.297, 1), (1.711, 2), (2.345, 3)] {
+        let case = Case::new(MOTOR, &[("firing.csv", firing(at, seed))]);
+        let found = go(&case, &case.fresh(), &mut InProcess::new(2), &Options::default());
+        let found = found.unwrap_or_else(|error| panic!("{error}")).explanation;
+        let named: Vec<&str> = found.effects.iter().map(|effect| effect.name.as_str()).collect();
+        assert_eq!(named, ["throat-step"], "{seed}: {}", found.headline);
+        let when = &found.effects[0].parameters[1];
+        assert!((when.estimate - at).abs() < 0.01 && when.sd < 0.01, "{seed}: {when:?}");
+    }
+}

@@ -56,6 +56,7 @@ mod tests {
         let places = [
             "judge",
             "refit/race.rs",
+            "refit/instants.rs",
             "refit/other_forms.rs",
             "refit/replacements.rs",
             "screen/proposals.rs",

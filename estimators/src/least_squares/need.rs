@@ -20,7 +20,7 @@ pub struct Scaled {
 
 impl Scaled {
     /// Twice the negative logarithm of the density at z, up to a constant.
-    pub(super) fn cost(&self, z: &DVector<f64>) -> f64 {
+    pub fn cost(&self, z: &DVector<f64>) -> f64 {
         let pull = z - &self.mean;
         pull.component_mul(&pull).dot(&self.precision)
     }

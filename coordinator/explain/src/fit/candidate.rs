@@ -27,6 +27,9 @@ pub(crate) struct Candidate {
     pub points: Vec<Vec<f64>>,
     /// Where it comes from.
     pub kind: Kind,
+    /// The instants among its parameters, by position, and how far they are moved at least for a difference: what lies between two
+    /// observations, or within a step of an integration, changes nothing.
+    pub instants: Vec<(usize, f64)>,
 }
 
 impl Candidate {
@@ -40,7 +43,7 @@ impl Candidate {
                 .flat_map(|point| values.iter().map(move |v| [point.as_slice(), &[*v]].concat()))
                 .collect();
         }
-        Self { def, points: thinned(points), kind: Kind::default() }
+        Self { def, points: thinned(points), kind: Kind::default(), instants: Vec::new() }
     }
 
     /// The same of a kind.

@@ -20,6 +20,8 @@ const STEP: f64 = 1e-3;
 const CHANGE: f64 = 0.3;
 /// Shortest step over the longest: the digits of an integration.
 const SHORTEST: f64 = 1e-2;
+/// Longest move of an instant, in z: where it is at an end of its range a sampling interval is far.
+const FARTHEST: f64 = 0.1;
 
 impl FittedVariant<'_> {
     /// The step of every parameter of the study, by what the last Jacobian says of it.
@@ -31,6 +33,12 @@ impl FittedVariant<'_> {
             let slope = (square / of_train.nrows().max(1) as f64).sqrt() * z[j].abs().max(1.0);
             let step = &mut steps[study.theta[j].parameter];
             *step = step.min((CHANGE / slope.max(CHANGE)).max(SHORTEST * STEP));
+        }
+        for (j, apart) in self.variant.instants() {
+            let entry = &study.theta[j];
+            let slope = entry.transform.derivative(self.variant.theta(z)[j]) * self.variant.unit()[j];
+            let step = &mut steps[entry.parameter];
+            *step = step.max((apart / slope).min(FARTHEST) / z[j].abs().max(1.0));
         }
         steps
     }

@@ -82,6 +82,15 @@ impl<'c> FittedVariant<'c> {
         Self { variant, solver, predicted, jacobian, own_values }
     }
 
+    /// Goes on from a point that was run, with the Jacobian that it has until another is measured.
+    pub(crate) fn go_on_from(&mut self, z: DVector<f64>, predicted: Arc<Vec<f64>>, rows: &Rows) {
+        let (residual, of_train) = (rows.train_residual(&predicted), self.jacobian.of_train.clone());
+        let scaled = self.variant.scaled.clone();
+        self.solver = LeastSquares::from_known(z, residual, of_train, scaled, TOLERANCE, TRIALS);
+        self.predicted = predicted;
+        self.polish();
+    }
+
     /// Asks for measured Jacobians until it has converged.
     pub(crate) fn polish(&mut self) {
         self.solver.polish(TRIALS);

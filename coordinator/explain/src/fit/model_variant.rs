@@ -114,6 +114,14 @@ impl<'c> ModelVariant<'c> {
         self.n_own + self.effects[..effect].iter().map(|m| m.candidate.def.parameters.len()).sum::<usize>()
     }
 
+    /// The entries that are instants of added effects, and how far they are moved at least for a difference, in their unit.
+    pub(crate) fn instants(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+        (0..self.effects.len()).flat_map(|m| {
+            let first = self.first_entry_of(m);
+            self.effects[m].candidate.instants.iter().map(move |(k, apart)| (first + k, *apart))
+        })
+    }
+
     /// The z of this variant that corresponds to `from` of another: values are taken by name, an amplitude that is new is zero,
     /// and the other parameters of a new effect stand at `point`.
     pub(crate) fn continue_from(

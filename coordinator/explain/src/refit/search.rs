@@ -242,6 +242,7 @@ impl<'c> Searcher<'_, '_, 'c> {
             fit.polish();
         }
         self.cut_short |= !drive(self.cache, &mut fits)?;
+        self.settle_instants(&mut fits)?;
         Ok(fits)
     }
 

@@ -7,6 +7,8 @@ use crate::rows::{Rows, Usage};
 
 /// Periods, and change points, at most.
 const MOST: usize = 2;
+/// Values in a window before or after a change at least.
+const SHORTEST: usize = 3;
 /// Frequencies per cycle over the record.
 const OVERSAMPLING: f64 = 4.0;
 /// Frequencies at most.
@@ -55,18 +57,22 @@ fn power(rows: &Rows, whitened: &[f64], stretch: &std::ops::Range<usize>, omega:
     2.0 * (cosine * cosine + sine * sine) / n
 }
 
-/// The instants at which the residuals of the training rows change most, the largest change first: where the means of two
-/// windows, before and after, differ most.
+/// The instants at which the residuals of the training rows change most, the largest change first: where the means of two windows,
+/// before and after, differ most for what white noise leaves in them. At the ends of a stretch there is room for shorter windows only.
 pub(crate) fn change_points(rows: &Rows, predicted: &[f64]) -> Vec<f64> {
     let scaled = rows.scaled(predicted);
     let mut found: Vec<(f64, f64, f64)> = Vec::new();
     for stretch in training(rows) {
         let (times, values): (Vec<f64>, Vec<f64>) = stretch.map(|i| (rows.rows[i].time, scaled[i])).unzip();
-        let width = (values.len() / 16).max(3);
-        for i in width..values.len().saturating_sub(width) {
+        let n = values.len();
+        let width = (n / 16).max(SHORTEST);
+        for i in SHORTEST..(n + 1).saturating_sub(SHORTEST) {
+            let (before, after) = (&values[i.saturating_sub(width)..i], &values[i..n.min(i + width)]);
             let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
-            let size = (mean(&values[i..i + width]) - mean(&values[i - width..i])).abs();
-            found.push((size, times[i], times[i + width - 1] - times[i]));
+            let spread = (1.0 / before.len() as f64 + 1.0 / after.len() as f64).sqrt();
+            let first = i.min(n.saturating_sub(width));
+            let apart = times[n.min(first + width) - 1] - times[first];
+            found.push(((mean(after) - mean(before)).abs() / spread, times[i], apart));
         }
     }
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -105,8 +111,10 @@ mod tests {
     }
 
     #[test]
-    fn a_jump_is_found_at_its_instant() {
-        let (rows, zero) = rows(|t| if t < 12.35 { 0.0 } else { 2.0 });
+    fn a_jump_is_found_at_its_instant_also_near_the_end() {
+        let (rows, zero) = rows(|t| if t < 29.45 { 0.0 } else { 2.0 });
+        assert!((change_points(&rows, &zero)[0] - 29.5).abs() < 1e-9);
+        let (rows, zero) = self::rows(|t| if t < 12.35 { 0.0 } else { 2.0 });
         assert!((change_points(&rows, &zero)[0] - 12.4).abs() < 1e-9);
     }
 }

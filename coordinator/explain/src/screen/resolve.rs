@@ -18,7 +18,17 @@ pub(crate) fn resolved_candidates(
     periods: &[f64],
     change_points: &[f64],
 ) -> Vec<Candidate> {
-    kinded(study, resolved(study, defs, tracks, periods, change_points))
+    let mut candidates = kinded(study, resolved(study, defs, tracks, periods, change_points));
+    let is_instant = |name: &String| {
+        let mut parameters = defs.iter().flat_map(|def| &def.parameters);
+        parameters.any(|p| p.name == *name && p.scale == Scale::Record)
+    };
+    for candidate in &mut candidates {
+        let places = candidate.def.parameters.iter().enumerate();
+        let instants = places.filter(|(_, p)| is_instant(&p.name)).map(|(k, _)| (k, sampling(study)));
+        candidate.instants = instants.collect();
+    }
+    candidates
 }
 
 /// The candidates made of these effects as they are, with their kinds.
