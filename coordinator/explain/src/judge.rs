@@ -15,7 +15,7 @@ pub(crate) mod held_out;
 pub(crate) mod misfit;
 pub(crate) mod noise_model;
 pub(crate) mod null_distribution;
-mod objections;
+pub(crate) mod objections;
 pub(crate) mod probability;
 mod range;
 mod rivals;

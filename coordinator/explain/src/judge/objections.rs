@@ -20,7 +20,7 @@ const STRUCTURED: f64 = 3.0;
 /// Share of the gap of the held-out span that may stay unaccounted for where the training residuals are noise.
 const UNACCOUNTED: f64 = 0.15;
 /// Where the residuals stay correlated, an effect must take away this share of the excess of the training rows ...
-const SHARE: f64 = 0.5;
+pub(crate) const SHARE: f64 = 0.5;
 /// ... and this share of that of the held-out span.
 const SHARE_HELD_OUT: f64 = 0.4;
 /// ... and no more than this share of the decoys may do as well.

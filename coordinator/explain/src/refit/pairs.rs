@@ -85,7 +85,8 @@ impl<'c> Searcher<'_, '_, 'c> {
         if first.is_empty() {
             return Ok(());
         }
-        let fits = self.refit(first)?;
+        let mut fits = self.refit(first)?;
+        fits.extend(self.members_alone(found, &fits)?);
         self.judge_all(found, fits)
     }
 

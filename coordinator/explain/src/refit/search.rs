@@ -19,6 +19,7 @@ use crate::judge::gates::{JudgedFit, judge};
 use crate::judge::held_out::held_out;
 use crate::judge::misfit::Misfit;
 use crate::judge::null_distribution::{LEAST, NullDistribution};
+use crate::judge::objections::SHARE;
 use crate::judge::search_result::SearchResult;
 use crate::judge::verdict::{Verdict, decide};
 use crate::locate::Track;
@@ -169,9 +170,12 @@ impl<'c> Searcher<'_, '_, 'c> {
             return Ok(Vec::new());
         }
         let mut results = screen(self.cache, fit, self.candidates, of, self.tracks)?;
+        // What takes most of a gap away is judged by what it leaves, and not by the gap.
         let noise = inflation(&self.cache.rows, fit.residual());
+        let excess = fit.residual().norm_squared() - fit.residual().len() as f64;
+        let least = (LEAST * noise).min(SHARE * excess).max(LEAST);
         for result in &mut results {
-            result.is_significant = self.asked || result.score.gain > LEAST * noise;
+            result.is_significant = self.asked || result.score.gain > least;
         }
         Ok(results)
     }
