@@ -56,6 +56,11 @@ impl Candidate {
         &self.def.name
     }
 
+    /// Number of values inside its terms, but for widths that round a corner.
+    pub(crate) fn n_inner(&self) -> usize {
+        self.def.parameters.iter().skip(1).filter(|parameter| !parameter.is_rounding).count()
+    }
+
     /// The sign that its amplitude must have; 0 when both are possible.
     pub(crate) fn sign(&self) -> f64 {
         match self.def.parameters.first().map(|p| p.range) {

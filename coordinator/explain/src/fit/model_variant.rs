@@ -109,6 +109,11 @@ impl<'c> ModelVariant<'c> {
         self.study.theta.len()
     }
 
+    /// Number of values inside the terms of its effects, but for widths that round a corner.
+    pub(crate) fn n_inner(&self) -> usize {
+        self.effects.iter().map(|effect| effect.candidate.n_inner()).sum()
+    }
+
     /// Position in the estimated vector of the first parameter of an added effect.
     pub(crate) fn first_entry_of(&self, effect: usize) -> usize {
         self.n_own + self.effects[..effect].iter().map(|m| m.candidate.def.parameters.len()).sum::<usize>()

@@ -111,11 +111,10 @@ pub(crate) fn judge<'c>(
 ) -> JudgedFit<'c> {
     let misfit = Misfit::of(cache, &fit);
     let m = cache.rows.train.len() as f64;
-    let n_inner = fit.variant.n_param().saturating_sub(fit.variant.n_own + fit.variant.effects.len());
     let adequacy = Adequacy::of(cache, &fit);
     let inflation = adequacy.inflation;
     // The price of a parameter inside a term is ln n (Schwarz 1978), with n the number of independent values.
-    let price = n_inner as f64 * (m / inflation).max(3.0).ln();
+    let price = fit.variant.n_inner() as f64 * (m / inflation).max(3.0).ln();
     // The price of a further effect is the gain that a search reaches by chance.
     let further = fit.variant.effects.len().saturating_sub(1) as f64 * threshold * inflation;
     let gain = before.train - misfit.train - price - further;

@@ -43,7 +43,7 @@ pub(crate) fn best_supported(cache: &RunCache<'_>, found: &SearchResult<'_>) -> 
     let possible = found.judged.iter().filter(|j| j.refusal.as_ref().is_none_or(|r| is_possible(r.gate)));
     for judged in possible.take(MOST) {
         let (fit, variant) = (&judged.fit, &judged.fit.variant);
-        let n_inner = variant.n_param().saturating_sub(variant.n_own + variant.effects.len()) as f64;
+        let n_inner = variant.n_inner() as f64;
         let searched = variant.effects.len() as f64 * found.null_distribution.threshold;
         let price = 0.5 * (searched + n_inner * (rows.train.len().max(3) as f64).ln());
         let noise = version(fit);

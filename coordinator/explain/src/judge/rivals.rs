@@ -3,7 +3,6 @@
 //! Next file to read: [`super::verdict`].
 
 use starlings_estimators::effective_sample_size;
-use starlings_models::EffectDef;
 
 use super::gates::JudgedFit;
 use super::search_result::SearchResult;
@@ -45,14 +44,9 @@ pub(super) fn rivals(
 /// one that does no better with them is an elaboration of what is told, as a clamp beyond all values is of what it clamps, and no rival of it.
 fn elaborates(judged: &JudgedFit<'_>, best: &JudgedFit<'_>) -> bool {
     let of = |judged: &JudgedFit<'_>| -> Vec<(Kind, usize)> {
-        judged.fit.variant.effects.iter().map(|e| (e.candidate.kind, n_inner(&e.candidate.def))).collect()
+        judged.fit.variant.effects.iter().map(|e| (e.candidate.kind, e.candidate.n_inner())).collect()
     };
     is_elaboration(&of(judged), &of(best))
-}
-
-/// Number of values inside the terms of an effect, but for widths that round a corner.
-fn n_inner(def: &EffectDef) -> usize {
-    def.parameters.iter().skip(1).filter(|parameter| !parameter.is_rounding).count()
 }
 
 /// The same by the kinds of the effects of both, and how many values each has inside its terms.
@@ -79,7 +73,8 @@ fn scatter(cache: &RunCache<'_>, a: &JudgedFit<'_>, b: &JudgedFit<'_>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use starlings_models::effect::EffectParameter;
+    use crate::fit::candidate::Candidate;
+    use starlings_models::effect::{EffectDef, EffectParameter};
 
     #[test]
     fn a_form_with_a_further_value_inside_elaborates_and_a_cause_or_a_rounded_corner_does_not() {
@@ -90,6 +85,6 @@ mod tests {
         assert!(!is_elaboration(&[clamp, drag], &[drag]), "and a set with a cause in it");
         let width = |is_rounding| EffectParameter { is_rounding, ..EffectParameter::default() };
         let parameters = vec![width(false), width(true), width(false)];
-        assert_eq!(n_inner(&EffectDef { parameters, ..EffectDef::default() }), 1);
+        assert_eq!(Candidate::new(EffectDef { parameters, ..EffectDef::default() }).n_inner(), 1);
     }
 }
