@@ -26,6 +26,8 @@ pub(crate) const ALIKE: f64 = 0.995;
 const POWER: f64 = 90.0;
 /// Posterior over prior standard deviation above which the data do not determine a parameter inside a term.
 const UNINFORMED: f64 = 0.5;
+/// Difference in χ² below which it is a toss-up which kind of a class is told first: odds of two to one.
+const TOSS_UP: f64 = 1.4;
 
 /// The verdict on a misfit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -113,20 +115,25 @@ pub(crate) fn decide(
 fn shown(found: &SearchResult<'_>, best: usize, rivals: &mut [usize]) -> usize {
     let class: Vec<usize> = std::iter::once(best).chain(rivals.iter().copied()).collect();
     let judged = class.iter().map(|i| &found.judged[*i]);
-    let described: Vec<_> = judged.map(|j| (j.standing(), (j.kinds(), complexity(j)))).collect();
-    let told = class[leading(&described, MARGIN * found.judged[best].inflation)];
+    let described: Vec<_> = judged.map(|j| (j.standing(), j.kinds(), complexity(j))).collect();
+    let told = class[leading(&described, found.judged[best].inflation)];
     if let Some(place) = rivals.iter_mut().find(|i| **i == told) {
         *place = best;
     }
     told
 }
 
-/// The position of what is best supported, the prior included; of what comes as near to it as `equal`, that with the least key: the likeliest
-/// kind before any data, then the simplest, then the better supported.
-fn leading<K: Ord>(class: &[(f64, K)], equal: f64) -> usize {
-    let most = class.iter().map(|(standing, _)| *standing).fold(f64::NEG_INFINITY, f64::max);
-    let near = class.iter().enumerate().filter(|(_, (standing, _))| *standing >= most - equal);
-    near.min_by(|(_, a), (_, b)| a.1.cmp(&b.1).then(b.0.total_cmp(&a.0))).map_or(0, |(i, _)| i)
+/// The position of what is best supported, the prior included; of its kind the simplest of what is tied with it, and another kind only where
+/// it is a toss-up and the likelier one before any data, since the prior counts already. `unit` is the effective noise.
+fn leading<K: Ord, C: Ord>(class: &[(f64, K, C)], unit: f64) -> usize {
+    let Some(best) = class.iter().max_by(|a, b| a.0.total_cmp(&b.0)) else { return 0 };
+    let is_near = |(standing, kind, _): &(f64, K, C)| {
+        let behind = best.0 - standing;
+        behind <= TOSS_UP * unit || (behind <= MARGIN * unit && *kind == best.1)
+    };
+    let near = class.iter().enumerate().filter(|(_, of)| is_near(of));
+    let told = near.min_by(|(_, a), (_, b)| (&a.1, &a.2).cmp(&(&b.1, &b.2)).then(b.0.total_cmp(&a.0)));
+    told.map_or(0, |(i, _)| i)
 }
 
 /// The sets of effects that are tied with what is shown, and its other names, which are no rivals.
@@ -236,13 +243,21 @@ mod tests {
 
     #[test]
     fn of_a_tie_the_best_supported_is_told_and_the_simplest_only_of_what_is_equally_so() {
-        // A proposal of two operations beside the best, which has three, and a constant that is far behind.
-        let class = |behind: f64| [(100.0, (1, 3)), (100.0 - behind, (1, 2)), (91.0, (0, 0))];
-        assert_eq!(leading(&class(7.0), MARGIN), 0);
-        assert_eq!(leading(&class(5.0), MARGIN), 1);
+        // A proposal of two operations beside the best, which has three, and a constant of a likelier kind that is behind.
+        let class = |proposal: f64, constant: f64| {
+            [(100.0, 'p', 3), (100.0 - proposal, 'p', 2), (100.0 - constant, 'g', 0)]
+        };
+        assert_eq!(leading(&class(7.0, 9.0), 1.0), 0);
+        assert_eq!(leading(&class(5.0, 9.0), 1.0), 1, "as good as tied, and simpler");
+        assert_eq!(leading(&class(5.0, 5.0), 1.0), 1, "what its kind is worth is counted already");
+        assert_eq!(leading(&class(5.0, 1.0), 1.0), 2, "a toss-up");
         // What a pair ended in may stand behind another single effect.
-        assert_eq!(leading(&class(-7.0), MARGIN), 1);
-        assert_eq!(leading(&[(90.0, 0), (93.0, 0)], MARGIN), 1, "of two that are equal otherwise");
-        assert_eq!(leading(&class(5.0), 10.0), 2, "in residuals of a larger effective noise all are equal");
+        assert_eq!(leading(&class(-7.0, 9.0), 1.0), 1);
+        assert_eq!(leading(&[(90.0, 'p', 0), (93.0, 'p', 0)], 1.0), 1, "of two that are equal otherwise");
+        assert_eq!(
+            leading(&class(5.0, 9.0), 10.0),
+            2,
+            "in residuals of a larger effective noise all are equal"
+        );
     }
 }
