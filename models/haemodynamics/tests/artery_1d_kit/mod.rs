@@ -1,6 +1,8 @@
 //! Arterial networks for tests, and ways to run and read them.
 #![allow(clippy::unwrap_used, dead_code, reason = "test helpers; each test binary uses its part")]
 
+use std::f64::consts::PI;
+
 use starlings_haemodynamics::{Artery1d, MODELS};
 use starlings_models_core::limits::Limits;
 use starlings_models_core::segment::{Drive, History, Segment};
@@ -16,6 +18,17 @@ impl History for NoHistory {
 
 /// No load, no friction, no viscosity of the wall.
 pub(crate) const QUIET: [(&str, f64); 3] = [("p0", 0.0), ("mu", 0.0), ("c_w", 0.0)];
+
+/// Density of the blood.
+pub(crate) const RHO: f64 = 1.06;
+
+/// Resistance, and factor of q|q|, of the loss of a stenosis in vessels of this radius (Young and Tsai 1973), with K_t = 1.52.
+pub(crate) fn young_tsai(radius: f64, severity: f64, length: f64, mu: f64) -> [f64; 2] {
+    let (ratio, area) = (1.0 / (1.0 - severity), PI * radius * radius);
+    let along = 0.83 * length + 1.64 * 2.0 * radius / ratio.sqrt();
+    let viscous = 32.0 * along / (2.0 * radius) * ratio * ratio;
+    [viscous * mu / (2.0 * PI * radius.powi(3)), 1.52 * RHO / (2.0 * area * area) * (ratio - 1.0).powi(2)]
+}
 
 /// Speed of small waves in a wall of E = 5e6, h = 0.15, ν = 1/2 around a radius of 1: K = 1e6, ρ = 1.06.
 pub(crate) fn speed() -> f64 {
