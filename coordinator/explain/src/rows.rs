@@ -10,6 +10,11 @@ use starlings_estimators::{CorrelatedNoise, freedom_of_third_differences};
 use starlings_study::Study;
 use starlings_study::field::quantity_of;
 
+#[cfg(test)]
+mod sample;
+#[cfg(test)]
+pub(crate) use sample::white;
+
 /// What a row may be used for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Usage {
@@ -248,40 +253,6 @@ impl Rows {
             .collect();
         (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
     }
-}
-
-#[cfg(test)]
-impl Rows {
-    /// One channel of n rows with noise 1 and the measured value zero, a step of time apart, each for the use that `usage` gives.
-    pub(crate) fn sample(n: usize, usage: impl Fn(usize) -> Usage) -> Self {
-        let row = |step: usize| {
-            let (time, usage) = (step as f64, usage(step));
-            Row {
-                record: 0,
-                channel: 0,
-                output: 0,
-                step,
-                time,
-                observed: 0.0,
-                noise: 1.0,
-                noise_freedom: f64::INFINITY,
-                usage,
-            }
-        };
-        let rows: Vec<Row> = (0..n).map(row).collect();
-        let train = (0..n).filter(|i| rows[*i].usage == Usage::Train).collect();
-        Self { train, rows, noise: Vec::new() }
-    }
-}
-
-/// White noise of sd 1.
-#[cfg(test)]
-pub(crate) fn white(n: usize, seed: u64) -> nalgebra::DVector<f64> {
-    use rand::SeedableRng;
-    use rand_distr::{Distribution, StandardNormal};
-
-    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
-    nalgebra::DVector::from_fn(n, |_, _| StandardNormal.sample(&mut random))
 }
 
 #[cfg(test)]

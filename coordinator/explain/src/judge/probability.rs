@@ -6,6 +6,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::adequacy::Adequacy;
 use super::gates::JudgedFit;
 use super::search_result::SearchResult;
 use super::verdict::{Decision, Verdict};
@@ -110,9 +111,13 @@ pub(crate) fn probabilities(
     weights.retain(|(set, _)| !decision.synonyms.contains(&set.names.join(" + ")));
     let of_verdict = odds * UNLISTED / (1.0 - UNLISTED);
     let listed = 1.0 / (1.0 + of_verdict);
-    // Where what is left may be a gap again, correlated or larger than chance leaves the noise, so much of the gap is in no list.
-    let is_left = is_answered && best.is_some_and(|j| j.adequacy.may_hide_a_gap());
-    Some(shared(weights, if is_left { listed * (1.0 - discrepancy) } else { listed }, discrepancy))
+    let left = best.filter(|_| is_answered).map(|j| &j.adequacy);
+    Some(shared(weights, left.map_or(listed, |left| still_listed(listed, left, discrepancy)), discrepancy))
+}
+
+/// The probability that the truth is in the list, with these residuals: where they may hide a gap again, as much of it as is left is in no list.
+fn still_listed(listed: f64, left: &Adequacy, discrepancy: f64) -> f64 {
+    if left.may_hide_a_gap() { listed * (1.0 - discrepancy) } else { listed }
 }
 
 /// Whether a variant has a say: it passes the gates, or, where nothing explains the gap, is at least possible.
@@ -174,6 +179,20 @@ mod tests {
                 "20 % of the gap is left"
             ]
         );
+    }
+
+    #[test]
+    fn what_is_left_beyond_chance_is_in_no_list() {
+        let left = |rmse_over_noise| Adequacy {
+            n: 200,
+            rmse_over_noise,
+            whiteness: Some(0.4),
+            inflation: 1.5,
+            over_spread: 0.1,
+            noise_freedom: 150.0,
+        };
+        assert!((still_listed(0.95, &left(1.25), 0.5) - 0.475).abs() < 1e-12, "half of the gap");
+        assert!((still_listed(0.95, &left(1.1), 0.5) - 0.95).abs() < 1e-12, "as chance leaves it");
     }
 
     #[test]

@@ -20,12 +20,12 @@ impl<'c> Searcher<'_, '_, 'c> {
         let Some(pair) = best.filter(|fit| fit.variant.effects.len() == 2) else { return Ok(Vec::new()) };
         let variant = &pair.variant;
         let known = found.judged.iter().map(|judged| &judged.fit).chain(refitted);
-        let alone: Vec<usize> = known
+        let refitted_alone: Vec<usize> = known
             .filter(|fit| fit.variant.effects.len() == 1 && fit.variant.left_out == variant.left_out)
             .map(|fit| fit.variant.effects[0].index)
             .collect();
         let mut begun = Vec::new();
-        for effect in variant.effects.iter().filter(|effect| !alone.contains(&effect.index)) {
+        for effect in variant.effects.iter().filter(|effect| !refitted_alone.contains(&effect.index)) {
             let alone = ModelVariant::new(variant.base, vec![effect.clone()], &variant.left_out)?;
             let start = alone.continue_from(variant, pair.z(), &[]);
             begun.push(FittedVariant::begin(alone, start));

@@ -93,7 +93,7 @@ fn training(rows: &Rows) -> Vec<std::ops::Range<usize>> {
 mod tests {
     use super::*;
 
-    fn rows(f: impl Fn(f64) -> f64) -> (Rows, Vec<f64>) {
+    fn sampled(f: impl Fn(f64) -> f64) -> (Rows, Vec<f64>) {
         let mut rows = Rows::sample(300, |_| Usage::Train);
         for row in &mut rows.rows {
             row.time *= 0.1;
@@ -104,7 +104,7 @@ mod tests {
 
     #[test]
     fn the_period_of_a_sine_is_found_to_a_fraction_of_a_cycle_over_the_record() {
-        let (rows, zero) = rows(|t| 3.0 + (std::f64::consts::TAU * t / 1.7).sin());
+        let (rows, zero) = sampled(|t| 3.0 + (std::f64::consts::TAU * t / 1.7).sin());
         let found = periods(&rows, &zero);
         // The frequencies are a quarter of a cycle over the record apart.
         assert!((30.0 / found[0] - 30.0 / 1.7).abs() <= 0.13, "{found:?}");
@@ -112,9 +112,9 @@ mod tests {
 
     #[test]
     fn a_jump_is_found_at_its_instant_also_near_the_end() {
-        let (rows, zero) = rows(|t| if t < 29.45 { 0.0 } else { 2.0 });
+        let (rows, zero) = sampled(|t| if t < 29.45 { 0.0 } else { 2.0 });
         assert!((change_points(&rows, &zero)[0] - 29.5).abs() < 1e-9);
-        let (rows, zero) = self::rows(|t| if t < 12.35 { 0.0 } else { 2.0 });
+        let (rows, zero) = sampled(|t| if t < 12.35 { 0.0 } else { 2.0 });
         assert!((change_points(&rows, &zero)[0] - 12.4).abs() < 1e-9);
     }
 }

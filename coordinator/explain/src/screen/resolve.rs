@@ -19,14 +19,12 @@ pub(crate) fn resolved_candidates(
     change_points: &[f64],
 ) -> Vec<Candidate> {
     let mut candidates = kinded(study, resolved(study, defs, tracks, periods, change_points));
-    let is_instant = |name: &String| {
-        let mut parameters = defs.iter().flat_map(|def| &def.parameters);
-        parameters.any(|p| p.name == *name && p.scale == Scale::Record)
-    };
     for candidate in &mut candidates {
-        let places = candidate.def.parameters.iter().enumerate();
-        let instants = places.filter(|(_, p)| is_instant(&p.name)).map(|(k, _)| (k, sampling(study)));
-        candidate.instants = instants.collect();
+        let Some(def) = defs.iter().find(|def| def.name == candidate.def.name) else { continue };
+        let is_instant =
+            |name: &str| def.parameters.iter().any(|p| p.name == name && p.scale == Scale::Record);
+        let places = candidate.def.parameters.iter().enumerate().filter(|(_, p)| is_instant(&p.name));
+        candidate.instants = places.map(|(k, _)| (k, sampling(study))).collect();
     }
     candidates
 }

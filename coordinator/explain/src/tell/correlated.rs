@@ -31,8 +31,8 @@ impl CorrelatedChannel {
 /// model.
 pub(crate) fn larger(study: &Study, rows: &Rows, predicted: &[f64]) -> Vec<String> {
     let says = |LargerNoise { output, factor, noise }| {
-        let trained = rows.train.iter().map(|i| &rows.rows[*i]);
-        let row = trained.into_iter().find(|row| row.output == output && row.noise_freedom.is_finite())?;
+        let mut trained = rows.train.iter().map(|i| &rows.rows[*i]);
+        let row = trained.find(|row| row.output == output && row.noise_freedom.is_finite())?;
         let (name, unit) = (&study.setup.outputs[output], spaced(&unit(study, row.record, row.channel)));
         let sd = three(factor * row.noise);
         let length = format!("{}{}", three(noise.length), spaced(&study.time_unit));
