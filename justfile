@@ -53,7 +53,7 @@ chaos:
 
 # How well the time left that is told agrees with the truth, on three examples. Minutes, on a quiet machine.
 time-left:
-    cargo test --test time_left -- --ignored --nocapture
+    cargo test --release --test time_left -- --ignored --nocapture
 
 # The same cycles through Starlings and through what others use, and the table of docs/fleet.md: a quarter of an hour on a quiet machine.
 peers:
