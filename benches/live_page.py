@@ -3,7 +3,8 @@
 
     python3 benches/live_page.py [--turns N]     the release build, or what STARLINGS names; nothing is asserted
 
-A viewer reads the stream as a browser does. Both workers compute all the time, so that whatever the page takes is missing to them.
+A viewer reads the stream as a browser does. Both workers compute all the time, so that whatever the page takes is missing to them: besides the time
+on the clock, which other work on the machine moves, the processor time that the coordinator itself takes is told (where there is a /proc).
 """
 
 import argparse
@@ -17,6 +18,7 @@ import threading
 import time
 import urllib.request
 from pathlib import Path
+from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -71,13 +73,41 @@ class Viewer(threading.Thread):
         return json.loads(line[len(b"data:") :])["view"]["state"] == "running"
 
 
-def timed(program: str, folder: Path, page: bool) -> tuple[float, int, int]:
-    """Seconds of a run, how many views were read, runs of the model."""
+class Processor(threading.Thread):
+    """Looks, until a process ends, how much processor time it has taken."""
+
+    def __init__(self, pid: int) -> None:
+        super().__init__(daemon=True)
+        self.stat, self.own = Path(f"/proc/{pid}/stat"), 0.0
+
+    def run(self) -> None:
+        while True:
+            try:
+                user, system = self.stat.read_text().rpartition(")")[2].split()[11:13]
+            except OSError:
+                return
+            self.own = (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
+            time.sleep(0.02)
+
+
+class Turn(NamedTuple):
+    """What one study took."""
+
+    #: On the clock, and of processors by the coordinator without its workers, s.
+    took: float
+    own: float
+    #: Views that were read, and runs of the model.
+    views: int
+    runs: int
+
+
+def timed(program: str, folder: Path, page: bool) -> Turn:
     out = Path(tempfile.mkdtemp(dir=folder)) / "out"
     call = [program, "run", "study.toml", "--workers", "2", "--out", str(out), *(["--dashboard"] if page else [])]
     started = time.perf_counter()
     run = subprocess.Popen(call, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-    viewer = None
+    processor, viewer = Processor(run.pid), None
+    processor.start()
     assert run.stderr is not None
     for line in run.stderr:
         if found := re.match(r"live page at (\S+)", line):
@@ -86,9 +116,10 @@ def timed(program: str, folder: Path, page: bool) -> tuple[float, int, int]:
     if run.wait() != 0:
         raise SystemExit("the study failed")
     took = time.perf_counter() - started
+    processor.join()
     if viewer:
         viewer.join(timeout=5)
-    return took, viewer.views if viewer else 0, runs(out)
+    return Turn(took, processor.own, viewer.views if viewer else 0, runs(out))
 
 
 def runs(out: Path) -> int:
@@ -108,19 +139,25 @@ def main() -> None:
         fast = 150_000.0
         for _ in range(3):
             (folder / "study.toml").write_text(STUDY.replace("FAST", f"{fast:.0f}"))
-            took, _, n = timed(program, folder, False)
-            each = 2 * took / n
-            print(f"{1e3 * each:.1f} ms a run, {n} runs")
+            first = timed(program, folder, False)
+            each = 2 * first.took / first.runs
+            print(f"{1e3 * each:.1f} ms a run, {first.runs} runs")
             fast *= 0.01 / each
         pairs = []
         for turn in range(turns):
             # Whoever is first changes from turn to turn.
             order = [False, True] if turn % 2 else [True, False]
-            took = {page: timed(program, folder, page) for page in order}
-            pairs.append(took[True][0] / took[False][0] - 1)
-            print(f"without {took[False][0]:.3f} s, with {took[True][0]:.3f} s and {took[True][1]} views", flush=True)
-        pairs.sort()
-        print(f"cost: {100 * statistics.median(pairs):.1f} % (from {100 * pairs[0]:.1f} to {100 * pairs[-1]:.1f}) in {turns} turns")
+            of = {page: timed(program, folder, page) for page in order}
+            without, seen = of[False], of[True]
+            pairs.append((seen.took / without.took - 1, (seen.own - without.own) / without.took))
+            print(
+                f"without {without.took:.3f} s, with {seen.took:.3f} s and {seen.views} views;"
+                f" of it the coordinator {without.own:.2f} and {seen.own:.2f} s",
+                flush=True,
+            )
+        for what, costs in zip(("on the clock", "more of a processor by the coordinator"), zip(*pairs)):
+            costs = sorted(100 * cost for cost in costs)
+            print(f"{what}: {statistics.median(costs):.1f} % (from {costs[0]:.1f} to {costs[-1]:.1f}) in {turns} turns")
 
 
 if __name__ == "__main__":
