@@ -41,7 +41,7 @@ mod window;
 
 pub use basis::{Basis, Rule};
 pub use change::{Change, compare};
-pub use coarse::{StepError, step_errors, step_in_rates};
+pub use coarse::{StepError, noise_errors, step_errors, step_in_rates};
 pub use decimation::{Decimation, Extrapolated, Strength, extrapolate};
 pub use detector::{Detector, DetectorState, Following, Report};
 pub use diffusion::Diffusion;

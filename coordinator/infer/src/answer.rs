@@ -59,12 +59,29 @@ impl Fitted {
         let checks = if sums.n_pair() > 0 { noise_checks(sums, structure, &posterior)? } else { Vec::new() };
         let matters = checks.iter().any(|check| check.verdict == Verdict::Matters);
         // What interpolation takes out of single steps, neighbouring ones have together.
-        let lag_corrected = (matters && choice.measured == MeasuredChoice::Auto) || choice.resample;
+        let is_auto = choice.measured == MeasuredChoice::Auto;
+        let mut lag_corrected = (matters && is_auto) || choice.resample;
+        let freed = Fit { lag_corrected: true, ..fit.clone() };
         if lag_corrected {
-            posterior = Fit { lag_corrected, ..fit.clone() }.posterior(sums, structure)?;
+            posterior = freed.posterior(sums, structure)?;
+        } else if is_auto && checks.iter().any(NoiseCheck::is_sure) {
+            // A long recording knows its coefficients so well that small errors matter too.
+            let without = freed.posterior(sums, structure).ok();
+            if let Some(without) = without.filter(|without| is_moved(&posterior, without)) {
+                (posterior, lag_corrected) = (without, true);
+            }
         }
         Ok(Self { posterior, checks, lag_corrected })
     }
+}
+
+/// Part of its standard deviation by which a coefficient is moved by small errors of the measurement where they count.
+const MOVED: f64 = 0.5;
+
+/// Whether a coefficient moves by much of its standard deviation from one posterior to the other.
+fn is_moved(from: &Posterior, to: &Posterior) -> bool {
+    let values = from.estimates.iter().zip(&to.estimates).filter_map(|(a, b)| a.value.zip(b.value));
+    values.into_iter().any(|(a, b)| (a.mean - b.mean).abs() > MOVED * a.sd)
 }
 
 /// A matrix row by row.

@@ -100,8 +100,17 @@ pub(crate) fn start(record: &InferRecord) -> Result<Start, InferError> {
         }
     }
     let Some(step) = even_step(&times) else {
-        let message = format!("record `{}` has too few rows in its span: {}", record.name, times.len());
-        return Err(rows.fault(None, message, "an inference needs many rows"));
+        let (message, help) = match times.as_slice() {
+            [before, time, ..] => {
+                let of = format!("no time of record `{}` is later than the one before", record.name);
+                (format!("{of}: {time} follows {before}"), "sort the rows by time, one per time")
+            }
+            few => (
+                format!("record `{}` has too few rows in its span: {}", record.name, few.len()),
+                "an inference needs many rows",
+            ),
+        };
+        return Err(rows.fault(None, message, help));
     };
     let per_row = (rows.n_byte() - before) as f64 / n_read as f64;
     let per_row = per_row.max(1.0);

@@ -3,7 +3,7 @@
 //! They are read here, whoever reads the recording: a few milliseconds, whatever its length. Next file to read: `words.rs`, which says it.
 
 use starlings_estimators::inference::{
-    Decimation, Fit, InferenceError, StepError, Sums, Verdict, step_errors, step_in_rates,
+    Decimation, Fit, InferenceError, StepError, Sums, Verdict, noise_errors, step_errors, step_in_rates,
 };
 use starlings_study::infer_choice::MeasuredChoice;
 
@@ -29,6 +29,8 @@ pub(crate) enum Coarse {
     Moved(Vec<StepError>),
     /// They would by a third at least of how far they move from twice the step; four times the step has no fit to extrapolate from.
     Moving(Vec<StepError>),
+    /// The noise moves them out of their intervals with the step, by the drift that was found.
+    Noise(Vec<StepError>),
     /// A step is so many times the fastest time of the drift, and longer steps have no fit to compare with.
     Fast(f64),
 }
@@ -44,14 +46,31 @@ pub(crate) fn coarse(
     at: Start,
 ) -> Option<Coarse> {
     let choice = asked.choice;
-    let is_noisy = answer.checks.iter().any(|check| check.verdict == Verdict::Matters);
+    let is_noisy =
+        answer.lag_corrected || answer.checks.iter().any(|check| check.verdict == Verdict::Matters);
     let is_known = matches!(choice.measured, MeasuredChoice::Known(_));
     if choice.sums.levels > 1 || choice.resample || is_known || is_noisy {
         return None;
     }
+    let found = pieces(asked, cut, at).ok().and_then(|pieces| compared(asked, fit, answer, sums, &pieces));
+    // The first rows alone know coefficients less well than a long recording.
+    let by_noise = || {
+        let moved = noise_errors(sums, &asked.question.structure, &answer.posterior, LEVEL);
+        (choice.prefactor && !moved.is_empty()).then_some(Coarse::Noise(moved))
+    };
+    found.or_else(by_noise)
+}
+
+/// What longer steps of the first rows say.
+fn compared(
+    asked: &Asked<'_>,
+    fit: &Fit,
+    answer: &Answer,
+    sums: &Sums,
+    pieces: &[[Sums; 3]],
+) -> Option<Coarse> {
     let structure = &asked.question.structure;
-    let pieces = pieces(asked, cut, at).ok()?;
-    let errors = |n_level| step_errors(&pieces, n_level, fit, structure, &answer.posterior, LEVEL);
+    let errors = |n_level| step_errors(pieces, n_level, fit, structure, &answer.posterior, LEVEL);
     match errors(3) {
         Ok(moved) => return (!moved.is_empty()).then_some(Coarse::Moved(moved)),
         Err(InferenceError::Shape { .. }) => return None,

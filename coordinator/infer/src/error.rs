@@ -29,7 +29,8 @@ pub enum InferError {
     /// Errors of the measurement are far larger than what states move by in a step.
     #[error(
         "errors of the measurement hide how these states move in a step: {says}; no fit holds the recording as it was measured (give \
-         `measurement_noise = <sd>` in [infer], which smooths, or average rows to fewer and longer steps)"
+         `measurement_noise = <sd>` in [infer], which smooths, or average rows to fewer and longer steps; where the sensor is better than that, \
+         steps are so long that neighbouring rows know nothing of one another: record in shorter ones)"
     )]
     Hidden {
         /// The states with the figures.
@@ -124,8 +125,8 @@ fn remedy(error: &InferenceError) -> &'static str {
             " (give `[[parameters]]` priors, ask for fewer terms, record in shorter steps, or use rule = \"ito\")"
         }
         InferenceError::DiffusionNotDefinite { .. } => {
-            " (make the equation's state an input, use diffusion = \"diagonal\" where equations share their noise, or look for a column \
-             that stands twice)"
+            " (make the equation's state an input, use diffusion = \"diagonal\" where equations share their noise, look for a column that \
+             stands twice or never moves, or give `measurement_noise = <sd>` where all that is seen of it are errors of the measurement)"
         }
         InferenceError::NothingObserved => {
             " (no function of theirs was ever different from zero in these recordings)"

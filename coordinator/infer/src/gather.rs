@@ -13,6 +13,7 @@ use starlings_study::infer_choice::InferRecord;
 use starlings_sums::{BlockAnswer, Fault, Part, Question, answer_of, block, file_block, file_part};
 
 use crate::blocks::{Block, Blocks, Cut, open};
+use crate::constancy::Stretches;
 use crate::error::InferError;
 use crate::file_blocks::{FileBlock, FileBlocks, FileRecord};
 
@@ -53,6 +54,8 @@ pub(crate) struct Gathered {
     pub(crate) steps: Vec<u64>,
     /// First and last time of each record so far.
     pub(crate) spans: Vec<[f64; 2]>,
+    /// The sampling step's sums once more, by stretches.
+    pub(crate) stretches: Stretches,
     record: usize,
 }
 
@@ -117,6 +120,7 @@ impl Work<'_> {
             n_block: 0,
             steps: vec![0; self.records.len()],
             spans: vec![[f64::NAN; 2]; self.records.len()],
+            stretches: Stretches::default(),
             record: 0,
         }
     }
@@ -228,6 +232,9 @@ impl Work<'_> {
             }
             whole.merge(sums)?;
         }
+        if let Some(sums) = levels.first().filter(|sums| sums.n_step() > 0) {
+            gathered.stretches.add(sums, record, span[0])?;
+        }
         gathered.record = record;
         gathered.n_block += 1;
         gathered.steps[record] += levels.first().map_or(0, Sums::n_step);
@@ -246,9 +253,10 @@ impl Work<'_> {
                 (*row, "an inference needs equal steps: `resample = STEP` in [infer] interpolates to them")
             }
             InferenceError::NotIncreasing { row, .. } => (*row, "keep one row per time, in their order"),
-            InferenceError::TimeJump { row, .. } => {
-                (*row, "use gaps = \"break\" in [infer] to go on behind it without a step across")
-            }
+            InferenceError::TimeJump { row, .. } => (
+                *row,
+                "use gaps = \"break\" in [infer] to go on behind it without a step across; `resample = STEP` is for rows at unequal times",
+            ),
             _ => return error.clone().into(),
         };
         let record = &self.records[record];

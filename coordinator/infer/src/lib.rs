@@ -23,6 +23,7 @@
 mod answer;
 mod blocks;
 mod coarse;
+mod constancy;
 mod convergence;
 pub mod error;
 mod even_step;

@@ -53,6 +53,13 @@ impl<R: Read> Rows<R> {
             let message = || format!("there is no column `{name}`");
             headers.iter().position(|h| h == name).ok_or_else(|| {
                 let help = match nearest(name, &headers) {
+                    _ if headers.len() == 1 && headers[0].contains(['\t', ';']) => {
+                        let sign = if headers[0].contains('\t') { "tabs" } else { "semicolons" };
+                        format!(
+                            "the columns are separated by {sign}, not by commas: `starlings init FILE` reads such a table and writes it \
+                             with commas"
+                        )
+                    }
                     Some(near) => format!("did you mean `{near}`?"),
                     None => format!("the columns are {}", headers.join(", ")),
                 };

@@ -12,6 +12,7 @@ use starlings_sums::Question;
 use crate::answer::{Answer, fit};
 use crate::blocks::{Cut, Start, start};
 use crate::coarse::{Coarse, coarse};
+use crate::constancy::Changed;
 use crate::convergence::Convergence;
 use crate::error::InferError;
 use crate::file_blocks::files;
@@ -76,7 +77,11 @@ pub fn infer(
     let convergence = convergence.finish(&fit, structure, &gathered);
     let sums = gathered.levels.first();
     let coarse = sums.and_then(|sums| coarse(&asked, &fit, &answer, sums, cut, at));
-    told_of(study, &asked, &gathered, &answer, cut, (convergence, missing, coarse))
+    // Rows that were interpolated or hold large errors share them, which the test of a change takes for independent.
+    let is_plain =
+        !choice.resample && choice.prefactor && !matches!(choice.measured, MeasuredChoice::Known(_));
+    let changed = is_plain.then(|| gathered.stretches.changed(&fit, structure)).flatten();
+    told_of(study, &asked, &gathered, &answer, cut, (convergence, missing, (coarse, changed)))
 }
 
 /// Terms that the drift lacks, where they are looked for: compared on the held-out records too, where there are any.
@@ -216,6 +221,9 @@ fn cut(choice: &InferChoice, asked: &Asked<'_>, at: Start) -> Cut {
     }
 }
 
+/// Whether steps are coarse, and where coefficients change.
+type Doubts = (Option<Coarse>, Option<Changed>);
+
 /// The tables.
 fn told_of(
     study: &Study,
@@ -223,7 +231,7 @@ fn told_of(
     gathered: &Gathered,
     answer: &Answer,
     cut: Cut,
-    (convergence, missing, coarse): (Vec<Converging>, Option<MissingFound>, Option<Coarse>),
+    (convergence, missing, (coarse, changed)): (Vec<Converging>, Option<MissingFound>, Doubts),
 ) -> Result<Inference, InferError> {
     let choice = asked.choice;
     let structure = &asked.question.structure;
@@ -236,6 +244,8 @@ fn told_of(
     let records = choice.records.iter().enumerate();
     let mut warnings = words::warnings(choice, answer, reduced.as_ref(), missing.as_ref());
     warnings.extend(coarse.map(|coarse| words::of_steps(&coarse, cut.step, &study.time_unit)));
+    let name = |changed: &Changed| choice.records[changed.record].name.clone();
+    warnings.extend(changed.map(|changed| words::of_change(&changed, &name(&changed), &study.time_unit)));
     Ok(Inference {
         study: study.name.clone(),
         verdict: words::verdict(n_step, &coefficients, reduced.as_ref(), missing.as_ref()),

@@ -7,6 +7,7 @@ use starlings_study::infer_choice::{InferChoice, MeasuredChoice};
 
 use crate::answer::Answer;
 use crate::coarse::Coarse;
+use crate::constancy::Changed;
 use crate::result::{CoefficientFound, MissingFound, NamedTerm, ReducedFound};
 
 /// The result in one sentence.
@@ -142,11 +143,51 @@ pub(crate) fn of_steps(coarse: &Coarse, step: f64, unit: &str) -> String {
             "{begins} {out} {} at least; four times the step has no fit, from which `richardson` could take it out: record in shorter steps",
             listed(moving)
         ),
+        Coarse::Noise(moved) => format!(
+            "{begins} what noise adds at mid-points is taken to first order of the step, and by the drift that was found coefficients \
+             would move by the next one out of their intervals, {}; `richardson = true` in [infer] takes that out where longer steps have a fit, \
+             shorter steps make it small",
+            listed(moved)
+        ),
         Coarse::Fast(rates) => format!(
             "{begins} a step is {rates:.1} times the fastest time of the drift that was found, whose rates are wrong by that; two or \
              four times the step has no fit, from which `richardson` could take it out: record at a tenth of that time"
         ),
     }
+}
+
+/// That the coefficients are not the same throughout.
+pub(crate) fn of_change(changed: &Changed, record: &str, unit: &str) -> String {
+    let Changed { name, from, by_chance, before: [before, sd_before], after: [after, sd_after], .. } =
+        changed;
+    let by_chance = if *by_chance < 1e-9 { "less than 1e-9".to_owned() } else { format!("{by_chance:.0e}") };
+    format!(
+        "the coefficients are not the same throughout: {name} is {before:.4} (sd {sd_before:.2e}) before {from} {unit} of record `{record}` \
+         and {after:.4} (sd {sd_after:.2e}) from there on (by chance with probability {by_chance}), and the table mixes both: infer from a \
+         span of them (`train`), or see when they change by `--follow`; where nothing did, the drift lacks a term or the noise is larger in \
+         some states than in others"
+    )
+}
+
+/// A prior that the data contradict: by more than so many standard deviations of what the data add.
+const CONTRADICTS: f64 = 4.0;
+
+/// Priors that the data contradict. The mean of the posterior lies from that of the prior by s₀² − s² of variance where both hold.
+fn of_priors(coefficients: &[CoefficientFound]) -> Vec<String> {
+    let of = |found: &CoefficientFound| {
+        let ([mean, wide], estimate, sd) = (found.prior?, found.at_step.or(found.estimate)?, found.sd?);
+        let moves = (wide * wide - sd * sd).max(1e-12 * wide * wide).sqrt();
+        let is_far = (estimate - mean).abs() > CONTRADICTS * moves;
+        is_far.then(|| {
+            format!(
+                "the data contradict the prior of {}: the estimate is {:.1} of the prior's standard deviations from its mean {mean}, and what \
+                 is shared with other coefficients moves these too; widen the prior or correct it",
+                found.name,
+                (estimate - mean).abs() / wide
+            )
+        })
+    };
+    coefficients.iter().filter_map(of).collect()
 }
 
 /// What would move, the furthest beside its interval first.
@@ -177,12 +218,15 @@ pub(crate) fn warnings(
                 .to_owned(),
         );
     }
-    let noisy: Vec<&NoiseCheck> =
-        answer.checks.iter().filter(|check| check.verdict == Verdict::Matters).collect();
+    warnings.extend(of_priors(&answer.coefficients(choice)));
+    // Small errors are told where they moved coefficients.
+    let is_told =
+        |check: &&NoiseCheck| check.verdict == Verdict::Matters || (answer.lag_corrected && check.is_sure());
+    let noisy: Vec<&NoiseCheck> = answer.checks.iter().filter(is_told).collect();
     if !noisy.is_empty() && !matches!(choice.measured, MeasuredChoice::Known(_)) {
         let of = |check: &&NoiseCheck| {
             format!(
-                "{} (ratio {:.2}, standard deviation about {:.2e})",
+                "{} (ratio {:.3}, standard deviation about {:.2e})",
                 check.equation,
                 check.ratio,
                 check.measured.max(0.0).sqrt()

@@ -21,7 +21,7 @@ pub struct StepError {
     pub name: String,
     /// What the extrapolation to no step adds to it.
     pub moves: f64,
-    /// Standard error of that.
+    /// Standard error of that; zero where it was computed from the drift that was found.
     pub sd: f64,
     /// Half-width of its interval, which the error of the step is not in.
     pub half: f64,
@@ -79,6 +79,31 @@ pub fn step_errors(
         })
     });
     Ok(moved.collect())
+}
+
+/// The coefficients that noise and a coarse step move out of their intervals of probability `level` together: ½ D V Φ⁻¹ is the first order in
+/// h div f of the Jacobian log|I − ½hJ|, whose slope in a coefficient is −½h tr((I − ½hJ)⁻¹ ∂J). Taken whole at the mean Jacobian, over all
+/// of the recording. A first-order error, where that of a path without noise is of second order.
+pub fn noise_errors(sums: &Sums, structure: &Structure, posterior: &Posterior, level: f64) -> Vec<StepError> {
+    let n = sums.n_state();
+    let half_step = 0.5 * sums.step();
+    let jacobian = posterior.drift() * sums.v().transpose() / sums.n_step().max(1) as f64;
+    let Some(whole) = (DMatrix::identity(n, n) - jacobian * half_step).try_inverse() else {
+        return Vec::new();
+    };
+    let missed = whole.transpose() * sums.v() - sums.v();
+    let score = |p: &usize| {
+        let places = structure.coefficients()[*p].places.iter();
+        -half_step * places.map(|a| a.factor * missed[(a.equation, a.function)]).sum::<f64>()
+    };
+    let active = posterior.active();
+    let moves = posterior.covariance() * DVector::from_iterator(active.len(), active.iter().map(score));
+    let moved = active.iter().zip(&moves).filter_map(|(p, moves)| {
+        let [lo, hi] = posterior.interval(*p, level)?;
+        let (half, estimate) = (0.5 * (hi - lo), &posterior.estimates[*p]);
+        (moves.abs() > half).then(|| StepError { name: estimate.name.clone(), moves: *moves, sd: 0.0, half })
+    });
+    moved.collect()
 }
 
 /// Step times the spectral radius of the mean Jacobian of a fitted drift: how many times its fastest time a step is. Functions at the left

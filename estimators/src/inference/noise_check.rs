@@ -15,6 +15,8 @@ use crate::quantiles::normal;
 pub const MATTERS: f64 = 0.05;
 /// Probability with which a verdict is right.
 const SURE: f64 = 0.95;
+/// Probability with which errors of any size are told to be present.
+const PRESENT: f64 = 0.99;
 
 /// Residuals of one equation at lag one.
 #[derive(serde::Serialize, serde::Deserialize, Debug, Clone, PartialEq)]
@@ -29,6 +31,13 @@ pub struct NoiseCheck {
     pub measured: f64,
     /// What follows.
     pub verdict: Verdict,
+}
+
+impl NoiseCheck {
+    /// Whether there are errors of the measurement at all, large or small: by chance in one of a hundred recordings without.
+    pub fn is_sure(&self) -> bool {
+        self.ratio > normal(PRESENT) * self.sd
+    }
 }
 
 /// What residuals at lag one say, with 95 % probability.

@@ -1,0 +1,122 @@
+//! Whether the coefficients are the same throughout the recordings: what lies before a time as the reference, what lies behind it tested
+//! against it.
+//!
+//! Stretches of neighbouring blocks have sums of their own, a dozen at most whatever the length. At every seam between two of them the
+//! score of what follows under the estimate of what lies before is asked (`estimators/src/inference/change.rs`); all seams share the rate
+//! of false alarms (Bonferroni). Next file to read: `words.rs`, which says it.
+
+use starlings_estimators::inference::{Fit, InferenceError, Structure, Sums, compare};
+
+/// Stretches at most: two of them are made one where there would be more.
+const MOST: usize = 16;
+/// Probability of telling a change of recordings that have none.
+const FALSE_ALARM: f64 = 1e-3;
+/// Standard deviations by which the coefficient that changed most has to differ, so that what is told shows in its figures.
+const SHOWS: f64 = 3.0;
+
+/// Neighbouring blocks.
+#[derive(Debug, Clone, PartialEq)]
+struct Stretch {
+    sums: Sums,
+    record: usize,
+    from: f64,
+    n_block: u64,
+}
+
+/// Sums of neighbouring blocks, in the order of the recordings.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct Stretches {
+    kept: Vec<Stretch>,
+    /// Blocks of a whole stretch.
+    blocks: u64,
+}
+
+/// Where coefficients change most.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Changed {
+    /// Number of the record, and the time in it from which they are others.
+    pub(crate) record: usize,
+    pub(crate) from: f64,
+    /// Probability of that in a recording without a change, for all times together.
+    pub(crate) by_chance: f64,
+    /// The coefficient that differs most beside its uncertainty: mean and sd before and from there on.
+    pub(crate) name: String,
+    pub(crate) before: [f64; 2],
+    pub(crate) after: [f64; 2],
+}
+
+impl Stretches {
+    /// Takes the sums of the next block, which begins at a time of a record.
+    ///
+    /// # Errors
+    /// `Incompatible` sums.
+    pub(crate) fn add(&mut self, sums: &Sums, record: usize, from: f64) -> Result<(), InferenceError> {
+        self.blocks = self.blocks.max(1);
+        match self.kept.last_mut() {
+            Some(last) if last.n_block < self.blocks => return last.take(sums, 1),
+            _ => {}
+        }
+        if self.kept.len() == MOST {
+            let mut halved: Vec<Stretch> = Vec::with_capacity(MOST);
+            for (k, stretch) in self.kept.drain(..).enumerate() {
+                match halved.last_mut() {
+                    Some(before) if k % 2 == 1 => before.take(&stretch.sums, stretch.n_block)?,
+                    _ => halved.push(stretch),
+                }
+            }
+            self.kept = halved;
+            self.blocks *= 2;
+        }
+        self.kept.push(Stretch { sums: sums.clone().detach(), record, from, n_block: 1 });
+        Ok(())
+    }
+
+    /// Where the coefficients change most, if they surely do.
+    pub(crate) fn changed(&self, fit: &Fit, structure: &Structure) -> Option<Changed> {
+        let mut most: Option<(usize, f64)> = None;
+        for seam in 1..self.kept.len() {
+            let probability = || {
+                let reference = fit.posterior(&merged(&self.kept[..seam])?, structure)?;
+                compare(&reference, &merged(&self.kept[seam..])?, structure, &[])
+            };
+            // Too few steps before a seam, or functions that are not seen there, say nothing of it.
+            let Ok(change) = probability() else { continue };
+            if most.is_none_or(|(_, least)| change.probability < least) {
+                most = Some((seam, change.probability));
+            }
+        }
+        let (seam, probability) = most?;
+        let by_chance = (probability * (self.kept.len() - 1) as f64).min(1.0);
+        if by_chance >= FALSE_ALARM {
+            return None;
+        }
+        let side = |of: &[Stretch]| fit.posterior(&merged(of).ok()?, structure).ok();
+        let (before, after) = (side(&self.kept[..seam])?, side(&self.kept[seam..])?);
+        let values = before.estimates.iter().zip(&after.estimates);
+        let both = values.filter_map(|(a, b)| Some((&a.name, a.value?, b.value?)));
+        let scored = both.map(|(name, a, b)| ((a.mean - b.mean).abs() / a.sd.hypot(b.sd), name, a, b));
+        let (score, name, a, b) = scored.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        let Stretch { record, from, .. } = self.kept[seam];
+        let (before, after) = ([a.mean, a.sd], [b.mean, b.sd]);
+        (score > SHOWS).then(|| Changed { record, from, by_chance, name: name.clone(), before, after })
+    }
+}
+
+impl Stretch {
+    /// Takes what follows. Residuals of neighbouring steps across the seam, one of hundreds, are left out.
+    fn take(&mut self, later: &Sums, n_block: u64) -> Result<(), InferenceError> {
+        self.sums.merge(later)?;
+        self.sums = self.sums.clone().detach();
+        self.n_block += n_block;
+        Ok(())
+    }
+}
+
+/// The sums of neighbouring stretches, of which there is one at least.
+fn merged(stretches: &[Stretch]) -> Result<Sums, InferenceError> {
+    let mut whole = stretches[0].sums.clone();
+    for stretch in &stretches[1..] {
+        whole.merge(&stretch.sums)?;
+    }
+    Ok(whole)
+}

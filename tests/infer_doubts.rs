@@ -1,0 +1,136 @@
+//! `starlings infer`: what is said where a recording is not what its intervals take it for.
+
+#![allow(clippy::unwrap_used)] // a failed unwrap is a failed test
+
+mod common;
+mod infer_kit;
+
+use std::fmt::Write as _;
+
+use infer_kit::{STUDY, folder, infer, recording, refused};
+use serde_json::Value;
+
+/// Warnings that hold these words.
+fn said<'a>(found: &'a Value, words: &str) -> Vec<&'a str> {
+    let all = found["warnings"].as_array().unwrap().iter().map(|warning| warning.as_str().unwrap());
+    all.filter(|warning| warning.contains(words)).collect()
+}
+
+/// Mean and standard deviation of the coefficient of this name.
+fn value(found: &Value, name: &str) -> [f64; 2] {
+    let all = found["coefficients"].as_array().unwrap();
+    let one = all.iter().find(|c| c["name"] == name).unwrap();
+    ["estimate", "sd"].map(|key| one[key].as_f64().unwrap())
+}
+
+/// Numbers of mean zero and variance one.
+fn noise() -> impl FnMut() -> f64 {
+    let mut state = 7_u64;
+    let mut uniform = move || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    move || (0..12).map(|_| uniform()).sum::<f64>() - 6.0
+}
+
+#[test]
+fn errors_so_small_that_only_a_long_recording_minds_them_are_taken_out_and_told() {
+    let clean = recording(200_000, usize::MAX);
+    let mut noise = noise();
+    let mut rows = clean.lines();
+    let mut measured = format!("{}\n", rows.next().unwrap());
+    for row in rows {
+        let cells: Vec<f64> = row.split(',').map(|cell| cell.parse().unwrap()).collect();
+        writeln!(measured, "{:?},{:?},{:?}", cells[0], cells[1] + 0.01 * noise(), cells[2] + 0.01 * noise())
+            .unwrap();
+    }
+    let clean = infer(folder(STUDY, &clean).path(), "out", "2");
+    assert_eq!(clean["diffusion"]["lag_corrected"], false);
+    let found = infer(folder(STUDY, &measured).path(), "out", "2");
+    let ratio = found["noise_checks"][0]["ratio"].as_f64().unwrap();
+    assert!((0.03..0.05).contains(&ratio), "a small one: {ratio}");
+    assert_eq!(found["diffusion"]["lag_corrected"], true, "{found}");
+    assert_eq!(said(&found, "errors of the measurement in x").len(), 1, "{found}");
+    assert_eq!(said(&found, "coarse for this dynamics").len(), 0, "{found}");
+    for name in ["k", "c", "d"] {
+        let ([without, sd], [with, _]) = (value(&clean, name), value(&found, name));
+        assert!((with - without).abs() < sd, "{name}: {without} ± {sd} without errors, {with} with them");
+    }
+}
+
+#[test]
+fn coefficients_that_change_during_a_recording_are_told_and_those_that_do_not_are_not() {
+    let steady = infer(folder(STUDY, &recording(20_000, usize::MAX)).path(), "out", "2");
+    assert_eq!(said(&steady, "not the same throughout"), Vec::<&str>::new());
+    let changed = recording(20_000, 10_000);
+    let found = infer(folder(STUDY, &changed).path(), "out", "2");
+    let told = said(&found, "not the same throughout: c is ");
+    assert_eq!(told.len(), 1, "{found}");
+    // Blocks have 300 steps and stretches at most eight blocks.
+    let from = told[0].split_once("before ").unwrap().1.split(' ').next().unwrap();
+    assert!((from.parse::<f64>().unwrap() - 100.0).abs() <= 12.0, "{told:?}");
+    // The same bytes, however many make the sums.
+    let one = infer(folder(STUDY, &changed).path(), "out", "1");
+    assert_eq!(one["warnings"], found["warnings"]);
+}
+
+#[test]
+fn a_prior_that_the_data_contradict_is_told() {
+    let of = |mean: f64, sd: f64| {
+        let prior = format!("prior = {{ transform = \"linear\", median = {mean}, sd = {sd} }}");
+        let study = format!("{STUDY}\n[[parameters]]\nname = \"k\"\n{prior}\n");
+        infer(folder(&study, &recording(10_000, usize::MAX)).path(), "out", "2")
+    };
+    assert_eq!(said(&of(2.5, 0.5), "contradict"), Vec::<&str>::new());
+    assert_eq!(said(&of(-5.0, 0.3), "contradict the prior of k").len(), 1);
+}
+
+#[test]
+fn what_noise_makes_of_a_coarse_step_is_told_of_a_long_recording_too() {
+    // A decay of rate 5 in steps of a quarter of its time, as it moves from row to row without any error.
+    let study = r#"
+[study]
+name = "decay"
+[model]
+kind = "equations"
+outputs = [ { name = "x", value = "x" } ]
+[[model.states]]
+name = "x"
+rate = "-a*x"
+[infer]
+parameters = ["a"]
+[[records]]
+name = "path"
+file = "data.csv"
+channels = [ { column = "x", output = "x" } ]
+"#;
+    let path = |step: f64, n: usize| {
+        let (mut noise, keeps) = (noise(), (-5.0 * step).exp());
+        let (mut x, mut text) = (0.0, "time,x\n".to_owned());
+        for k in 0..=n {
+            writeln!(text, "{:?},{x:?}", (k as f64 * step * 1e6).round() / 1e6).unwrap();
+            x = keeps * x + (0.1 * (1.0 - keeps * keeps)).sqrt() * noise();
+        }
+        infer(folder(study, &text).path(), "out", "2")
+    };
+    let found = path(0.05, 30_000);
+    assert!(value(&found, "a")[0] > 5.5, "{found}");
+    assert_eq!(said(&found, "coarse for this dynamics").len(), 1, "{found}");
+    let fine = path(0.005, 30_000);
+    assert_eq!(said(&fine, "coarse for this dynamics"), Vec::<&str>::new());
+}
+
+#[test]
+fn a_table_of_other_separators_or_in_another_order_is_told_as_that() {
+    let data = recording(2_000, usize::MAX);
+    for (sign, name) in [("\t", "tabs"), (";", "semicolons")] {
+        refused(STUDY, &data.replace(',', sign), &[&format!("separated by {name}"), "starlings init FILE"]);
+    }
+    let mut rows: Vec<&str> = data.lines().collect();
+    rows[1..].reverse();
+    refused(
+        STUDY,
+        &(rows.join("\n") + "\n"),
+        &["later than the one before: 19.99 follows 20", "sort the rows"],
+    );
+}
