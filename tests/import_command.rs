@@ -11,10 +11,16 @@ use common::{output, refused, repository, starlings};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
+#[path = "import_command/arteries.rs"]
+mod arteries;
 #[path = "import_command/hearts.rs"]
 mod hearts;
+#[path = "import_command/loop_scheme.rs"]
+mod loop_scheme;
 #[path = "import_command/melis.rs"]
 mod melis;
+#[path = "import_command/signals.rs"]
+mod signals;
 
 /// Columns by name.
 type Table = BTreeMap<String, Vec<f64>>;
@@ -161,7 +167,8 @@ fn blocks_keys_and_values_that_are_not_understood_are_named() {
         ("/junctions/0/outlet_vessels", json!([1, 7]), "no vessel has the id 7"),
         ("/simulation_parameters/speed", json!(1), "simulation_parameters.speed: unknown field"),
         ("/simulation_parameters/coupled_simulation", json!(true), "coupled_simulation"),
-        ("/calibration_parameters", json!({}), "unknown field `calibration_parameters`"),
+        ("/calibration_parameters", json!({}), "`calibration_parameters`: is an input of svZeroDCalibrator"),
+        ("/geometry", json!({}), "unknown field `geometry`"),
     ];
     let path = folder.path().join("changed.json");
     for (place, value, words) in cases {
@@ -248,7 +255,9 @@ fn an_aorta_of_openbf_runs_and_what_the_model_lacks_is_named() {
     let cases = [
         ("R1: 1.1752e7", "Rt: 0.5", "a reflection coefficient (`Rt`)"),
         ("R2: 1.1167e8", "visco-elastic: true", "`visco-elastic`"),
-        ("R2: 1.1167e8", "M: 5", "a Windkessel of two elements"),
+        ("R2: 1.1167e8", "M: 5", "less than the impedance of its end, and there is no R2"),
+        ("project_name:", "project name:", "is of an openBF before version 1: write `project_name`"),
+        ("R2: 1.1167e8", "R2: 1.1167e8\n    Pout: .nan", "Pout is NaN"),
         ("inlet_impedance_matching: false", "inlet_impedance_matching: true", "`inlet_impedance_matching`"),
         ("gamma_profile: 9", "gamma profile: 9", "write `gamma_profile`"),
         ("gamma_profile: 9", "colour: red", "unknown field `colour`"),

@@ -27,8 +27,8 @@ fn a_closed_loop_beats_as_its_equations_do_in_small_steps() {
     assert!(volumes.iter().all(|v| v.iter().all(|v| (5.0..300.0).contains(v))), "{volumes:?}");
 }
 
-#[test]
-fn chambers_between_valves_and_their_start_are_read() {
+/// A pressure, a valve, a chamber with these values, a valve and a resistance, the second of two periods.
+fn beating(chamber: &Value) -> Value {
     let pulse = |t: f64| if t < 0.17 { 5.0 * (1.0 - (std::f64::consts::TAU * t / 0.17).cos()) } else { 0.0 };
     let times: Vec<f64> = (0..=100).map(|k| f64::from(k) / 100.0).collect();
     let pressures: Vec<f64> = times.iter().map(|t| pulse(*t)).collect();
@@ -36,7 +36,7 @@ fn chambers_between_valves_and_their_start_are_read() {
         json!({ "type": "ValveTanh", "name": name, "params": { "Rmax": 1e5, "Rmin": 100.0, "Steepness": 100.0,
             "upstream_block": up, "downstream_block": down } })
     };
-    let text = json!({
+    json!({
         "simulation_parameters": { "number_of_cardiac_cycles": 2, "number_of_time_pts_per_cardiac_cycle": 101 },
         "boundary_conditions": [
             { "bc_name": "INLET", "bc_type": "PRESSURE", "bc_values": { "t": times, "P": pressures } },
@@ -46,15 +46,26 @@ fn chambers_between_valves_and_their_start_are_read() {
             "boundary_conditions": { "outlet": "OUTLET" },
             "zero_d_element_values": { "C": 1e-4, "R_poiseuille": 100.0 } }],
         "valves": [valve("valve0", "INLET", "ventricle"), valve("valve1", "ventricle", "vessel")],
-        "chambers": [{ "type": "ChamberElastanceInductor", "name": "ventricle", "values": { "Emax": 1.057, "Emin": 0.091,
-            "Vrd": 26.1, "Vrs": 18.0, "t_active": 0.2, "t_twitch": 0.3, "Impedance": 0.000_351_787 } }],
+        "chambers": [chamber],
         "initial_condition": { "Vc:ventricle": 96.07, "flow:valve0:ventricle": 0.0 },
-    });
+    })
+}
+
+/// A chamber that beats as half a cosine.
+fn twitching() -> Value {
+    json!({ "type": "ChamberElastanceInductor", "name": "ventricle", "values": { "Emax": 1.057, "Emin": 0.091,
+        "Vrd": 26.1, "Vrs": 18.0, "t_active": 0.2, "t_twitch": 0.3, "Impedance": 0.000_351_787 } })
+}
+
+#[test]
+fn chambers_between_valves_and_their_start_are_read() {
+    let text = beating(&twitching());
     let folder = TempDir::new().unwrap();
     let (path, out) = (folder.path().join("beat.json"), folder.path().join("beat"));
     std::fs::write(&path, text.to_string()).unwrap();
     let said = import(&path, &out);
     assert!(said["notes"].to_string().contains("`flow:valve0:ventricle`"), "{said}");
+    assert!(said["notes"].to_string().contains("for the 3 periods under the means of the inputs"), "{said}");
     let found = predicted(&out);
     // At the valves' smallest resistance hardly anything leaves in a beat: the pressure is that of the file's elastance.
     let (time, volume) = (&found["time"], &found["V_ventricle"]);
@@ -92,6 +103,48 @@ fn a_patients_network_of_stenoses_is_imported_in_its_periodic_state() {
     for (name, values) in exact.iter().filter(|(name, _)| !name.ends_with("_wall") && *name != "time") {
         let most = difference(&found, name, &exact["time"], values);
         assert!(most < 2e-4, "{name} is off by {most}");
+    }
+}
+
+#[test]
+fn an_activation_is_read_beside_the_values_of_a_chamber_and_among_them() {
+    let folder = TempDir::new().unwrap();
+    let run = |name: &str, chamber: &Value| {
+        let (path, out) = (folder.path().join(format!("{name}.json")), folder.path().join(name));
+        std::fs::write(&path, beating(chamber).to_string()).unwrap();
+        import(&path, &out);
+        std::fs::read_to_string(out.join("inputs.csv")).unwrap()
+    };
+    let hill = json!({ "t_shift": 0.2, "tau_1": 0.1, "tau_2": 0.3, "m1": 1.32, "m2": 21.9 });
+    let chamber = || json!({ "type": "LinearElastanceChamber", "name": "ventricle", "values": { "Emax": 1.0, "Epass": 0.1, "Vrest": 20.0 } });
+    let (mut beside, mut among) = (chamber(), chamber());
+    beside["activation_function"] = hill.clone();
+    beside["activation_function"]["type"] = json!("two_hill");
+    among["values"]["activation_type"] = json!(2);
+    for (key, value) in hill.as_object().unwrap() {
+        among["values"][key] = value.clone();
+    }
+    let inputs = run("beside", &beside);
+    assert_eq!(inputs, run("among", &among));
+    let inputs = table(&inputs);
+    let hills = |t: f64| {
+        let since = (t - 0.2f64).rem_euclid(1.0);
+        let rise = (since / 0.1).powf(1.32);
+        rise / (1.0 + rise) / (1.0 + (since / 0.3).powf(21.9))
+    };
+    let most = (0..100_000).map(|k| hills(f64::from(k) * 1e-5)).fold(0.0, f64::max);
+    for (t, a) in inputs["time"].iter().zip(&inputs["ventricle_activation"]) {
+        assert!((a - hills(*t) / most).abs() < 1e-6, "{t}: {a}");
+    }
+    let path = folder.path().join("bad.json");
+    among["values"]["activation_type"] = json!(7);
+    beside["type"] = json!("RegazzoniChamber");
+    let cases = [(among, "activation_type: 7 is not 0, 1 or 2"), (beside, "write `PiecewiseCosineChamber`")];
+    for (chamber, words) in cases {
+        std::fs::write(&path, beating(&chamber).to_string()).unwrap();
+        let out = folder.path().join("bad");
+        refused(starlings().arg("import").arg(&path).arg("--out").arg(&out), &[words]);
+        assert!(!out.exists());
     }
 }
 

@@ -51,6 +51,10 @@ struct Parts {
     /// Outputs with the pressure in the middle of each vessel.
     middles: Vec<String>,
     notes: Vec<String>,
+    /// Vessels that taper, those of them whose thickness is openBF's fit, and those with one resistance at their outlet.
+    tapering: Vec<String>,
+    fitted: Vec<String>,
+    single: Vec<String>,
     n_cell: usize,
     names: Names,
 }
@@ -66,18 +70,48 @@ impl Parts {
             channels: vec![("inlet_pressure".to_owned(), "dyn/cm^2")],
             middles: Vec::new(),
             notes: Vec::new(),
+            tapering: Vec::new(),
+            fitted: Vec::new(),
+            single: Vec::new(),
             n_cell: 0,
             names: Names::default(),
         };
         for vessel in &file.network {
             parts.segment(vessel, file.network.len() == 1)?;
             if outlets.contains(&vessel.tn) {
-                parts.outlet(vessel, outlets.len() == 1)?;
+                parts.outlet(vessel, file.blood.rho, outlets.len() == 1)?;
             } else {
                 vessel.inner()?;
             }
         }
+        parts.tell();
         Ok(parts)
+    }
+
+    /// Tells in a sentence each what holds for several vessels.
+    fn tell(&mut self) {
+        let sentences = [
+            (
+                &self.tapering,
+                "tapers: openBF takes the change of the radius from cell to cell for one per metre and so computes a vessel of \
+             almost the radius at its start; the study follows the file",
+            ),
+            (
+                &self.fitted,
+                "tapers and has no thickness: that of openBF's fit stands at its ends, and is linear in between",
+            ),
+            (
+                &self.single,
+                "has R1 and no R2: as in openBF, R1 stands before the compliance, and R1 less the impedance of the vessel behind it",
+            ),
+        ];
+        for (vessels, sentence) in sentences {
+            if let Some((first, others)) = vessels.split_first() {
+                let others =
+                    if others.is_empty() { String::new() } else { format!(" (and {} others)", others.len()) };
+                self.notes.push(format!("`{first}`{others} {sentence}"));
+            }
+        }
     }
 
     /// Adds a vessel.
@@ -89,10 +123,11 @@ impl Parts {
         self.n_cell += artery.cells;
         let young = if alone { "E1".to_owned() } else { format!("E_{name}") };
         self.constants.push((young, artery.young));
-        if vessel.h0.is_none() && artery.thickness[0].to_bits() != artery.thickness[1].to_bits() {
-            self.notes.push(format!(
-                "`{name}` tapers and has no thickness: that of openBF's fit stands at its ends, and is linear in between"
-            ));
+        if artery.radius[0].to_bits() != artery.radius[1].to_bits() {
+            self.tapering.push(name.clone());
+            if vessel.h0.is_none() {
+                self.fitted.push(name.clone());
+            }
         }
         // Writing to a text cannot fail.
         let _ = writeln!(
@@ -113,8 +148,11 @@ impl Parts {
     }
 
     /// Adds the Windkessel behind a vessel.
-    fn outlet(&mut self, vessel: &Vessel, alone: bool) -> Result<(), String> {
-        let windkessel = vessel.windkessel()?;
+    fn outlet(&mut self, vessel: &Vessel, density: f64, alone: bool) -> Result<(), String> {
+        let windkessel = vessel.windkessel(density)?;
+        if windkessel.alone {
+            self.single.push(vessel.label.clone());
+        }
         let own = |stem: &str| if alone { stem.to_owned() } else { format!("{stem}_{}", node(vessel.tn)) };
         let _ = writeln!(self.nodes, "    {{ name = \"{}\", kind = \"rcr\" }},", node(vessel.tn));
         self.constants.push((own("R_p"), tidy(windkessel.proximal)));
@@ -165,10 +203,24 @@ fn shared(file: &File) -> Result<Vec<(String, f64)>, String> {
         ("k_s", 0.0),
         ("c_s", 0.0),
         ("p_ext", 10.0 * outside),
-        ("p_venous", 0.0),
+        ("p_venous", 10.0 * behind(&file.network)?),
         ("p0", 10.0 * outside),
     ];
     Ok(constants.map(|(name, value)| (name.to_owned(), tidy(value))).to_vec())
+}
+
+/// The pressure behind all Windkessels, in Pa.
+fn behind(vessels: &[Vessel]) -> Result<f64, String> {
+    let mut outlets = vessels.iter().filter(|vessel| vessel.Cc.is_some());
+    let Some(first) = outlets.next() else { return Ok(0.0) };
+    match outlets.find(|vessel| vessel.Pout.to_bits() != first.Pout.to_bits()) {
+        None if first.Pout.is_finite() => Ok(first.Pout),
+        None => Err(format!("vessel `{}`: Pout is {}: give a pressure", first.label, first.Pout)),
+        Some(other) => Err(format!(
+            "vessel `{}`: Pout is {} and that of `{}` {}: `artery-1d` has one pressure behind all Windkessels",
+            other.label, other.Pout, first.label, first.Pout
+        )),
+    }
 }
 
 /// The node at which the flow enters, and those at which it leaves.

@@ -141,7 +141,7 @@ impl Inputs {
 
 impl Samples {
     /// Whether it ends elsewhere than it begins.
-    fn jumps(&self) -> bool {
+    pub(super) fn jumps(&self) -> bool {
         let (first, last) = (self.values[0], self.values[self.values.len() - 1]);
         (first - last).abs() > 1e-9 * first.abs().max(last.abs())
     }

@@ -5,7 +5,9 @@
 mod activation;
 mod blocks;
 mod chambers;
+mod driven;
 mod file;
+mod formula;
 mod heart;
 mod initial;
 mod junctions;
@@ -13,6 +15,8 @@ mod kind;
 mod layout;
 mod network;
 mod outlets;
+mod signal;
+mod vessels;
 
 use serde_json::Value;
 
@@ -28,7 +32,10 @@ pub(super) fn plan(name: &str, text: &str) -> Result<Plan, String> {
     let mut blocks = Blocks::new(&file)?;
     let simulation = &file.simulation_parameters;
     let period = period(&blocks, simulation)?;
+    blocks.sample_formulas(period)?;
+    let driven = blocks.network.prescribe(&blocks.courses);
     blocks.network.mend(period);
+    blocks.courses.extend(driven);
     let mut course = course(&file)?;
     let mut notes = Vec::new();
     if simulation.use_cycle_to_cycle_error {
@@ -71,7 +78,7 @@ pub(super) fn plan(name: &str, text: &str) -> Result<Plan, String> {
     })
 }
 
-/// The resistance of the first vessel that has one.
+/// The resistance or the compliance of the first vessel that has one.
 fn first_vessel(elements: &[network::Element]) -> Result<Vec<Unknown>, String> {
     let unknown = elements.iter().find_map(|element| match element.kind {
         Kind::Resistance(value) => {
@@ -80,9 +87,16 @@ fn first_vessel(elements: &[network::Element]) -> Result<Vec<Unknown>, String> {
         Kind::Loss { quadratic: value, .. } => {
             Some(Unknown { name: format!("Kq_{}", element.name), unit: "g/cm^7", value })
         }
+        Kind::Capacitor { value, outside: None } => {
+            Some(Unknown { name: format!("C_{}", element.name), unit: "cm^5/dyn", value })
+        }
         _ => None,
     });
-    Ok(vec![unknown.ok_or("no vessel and no outlet has a resistance: there is nothing to estimate")?])
+    Ok(vec![
+        unknown.ok_or(
+            "no vessel and no outlet has a resistance or a compliance: there is nothing to estimate",
+        )?,
+    ])
 }
 
 fn once_each(channels: Vec<(String, &'static str)>) -> Vec<(String, &'static str)> {

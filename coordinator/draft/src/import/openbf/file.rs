@@ -80,6 +80,9 @@ pub(super) struct Vessel {
     pub(super) R2: Option<f64>,
     /// Compliance in m³/Pa.
     pub(super) Cc: Option<f64>,
+    /// Pressure behind the distal resistance in Pa.
+    #[serde(default)]
+    pub(super) Pout: f64,
     /// Reflection coefficient.
     pub(super) Rt: Option<f64>,
     pub(super) outlet: Option<String>,
@@ -104,8 +107,25 @@ pub(super) fn read(text: &str) -> Result<File, String> {
             .map(|at| format!("line {}, column {}: ", at.line(), at.column()))
             .unwrap_or_default();
         let message = error.without_snippet().to_string();
-        format!("{place}{message}")
+        old(text).unwrap_or_else(|| format!("{place}{message}"))
     })
+}
+
+/// Keys of openBF before its version 1.
+const OLD: [&str; 7] =
+    ["project name", "inlet", "inlet file", "inlet number", "R0p", "R0d", "convergence tollerance"];
+
+/// What to do with a file of an older version of openBF.
+fn old(text: &str) -> Option<String> {
+    let key = |line: &str| {
+        line.trim_start().trim_start_matches("- ").split(':').next().unwrap_or_default().trim().to_owned()
+    };
+    let (at, found) = text.lines().map(key).enumerate().find(|(_, key)| OLD.contains(&key.as_str()))?;
+    Some(format!(
+        "line {}: `{found}` is of an openBF before version 1: write `project_name`; `inlet_file` at the top, without `inlet`, `inlet file` and \
+         `inlet number` of the vessel; `Rp` and `Rd` for `R0p` and `R0d`; `gamma_profile`; and `convergence_tolerance`, in mmHg",
+        at + 1
+    ))
 }
 
 /// The inflow: rows of a time in s and a flow in m³/s, separated by spaces, tabs or commas.

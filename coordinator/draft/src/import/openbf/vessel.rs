@@ -24,6 +24,8 @@ pub(super) struct Windkessel {
     pub(super) proximal: f64,
     pub(super) distal: f64,
     pub(super) compliance: f64,
+    /// Whether the file has one resistance.
+    pub(super) alone: bool,
 }
 
 /// Thickness in m that openBF gives a vessel of this radius in m without one.
@@ -68,7 +70,7 @@ impl Vessel {
     }
 
     /// What follows a vessel that ends in nothing else.
-    pub(super) fn windkessel(&self) -> Result<Windkessel, String> {
+    pub(super) fn windkessel(&self, density: f64) -> Result<Windkessel, String> {
         if self.Rt.is_some() || self.outlet.as_deref() == Some("reflection") {
             return Err(self.lacks("an outlet with a reflection coefficient (`Rt`)"));
         }
@@ -82,15 +84,34 @@ impl Vessel {
             let message = "nothing follows it and it has no Windkessel (R1, R2, Cc); an outlet without one is not in `artery-1d`";
             return Err(self.wrong(message));
         };
-        let Some(distal) = self.R2.filter(|r| *r != 0.0) else {
-            return Err(self.lacks("a Windkessel of two elements (R1 and Cc without R2)"));
+        let distal = self.R2.filter(|r| *r != 0.0);
+        let alone = distal.is_none();
+        let distal = match distal {
+            Some(distal) => distal,
+            None => proximal - self.impedance(density)?,
         };
+        if alone && distal <= 0.0 {
+            let message = format!(
+                "R1 is {proximal}, less than the impedance of its end, and there is no R2: give both"
+            );
+            return Err(self.wrong(&message));
+        }
         for (key, value) in [("R1", proximal), ("R2", distal), ("Cc", compliance)] {
             if !(value > 0.0 && value.is_finite()) {
                 return Err(self.wrong(&format!("{key} is {value}: give a number above zero")));
             }
         }
-        Ok(Windkessel { proximal: 1e-5 * proximal, distal: 1e-5 * distal, compliance: 1e5 * compliance })
+        let (proximal, distal, compliance) = (1e-5 * proximal, 1e-5 * distal, 1e5 * compliance);
+        Ok(Windkessel { proximal, distal, compliance, alone })
+    }
+
+    /// ρc/A₀ of its end without load, in Pa s/m³: c² = β/2ρ with β = (4/3) √π E h/√A₀ (Melis 2017).
+    fn impedance(&self, density: f64) -> Result<f64, String> {
+        let artery = self.artery()?;
+        let (radius, thickness) = (0.01 * artery.radius[1], 0.01 * artery.thickness[1]);
+        let beta = 4.0 / 3.0 * self.E * thickness / radius;
+        let area = std::f64::consts::PI * radius * radius;
+        Ok((0.5 * density * beta).sqrt() / area)
     }
 
     /// Refuses what only an outlet may have.

@@ -10,6 +10,8 @@ use super::super::plan::Samples;
 
 /// Intervals of a period: lines between the samples are off by 10⁻⁵ of a full activation.
 const INTERVALS: usize = 1000;
+/// Times of a period at which its largest value is looked for.
+const FINE: usize = 10_000;
 
 /// Cosine and sine coefficients of a ventricle's elastance over a period, in parts of its systolic one: the constants that
 /// svZeroDSolver has from the measurements of Senzaki et al. (1996).
@@ -52,6 +54,10 @@ pub(super) enum Shape {
     Wrapping { Tsa: f64, tpwave: f64 },
     /// A ventricle's elastance in parts of its systolic one.
     Fourier,
+    /// The same, from zero to one.
+    FourierFromZero,
+    /// The product of a rising and a falling Hill function of the time since `shift`, in parts of its largest value (Mynard et al. 2012).
+    TwoHill { shift: f64, times: [f64; 2], powers: [f64; 2] },
 }
 
 impl Shape {
@@ -63,10 +69,14 @@ impl Shape {
                 vec![("contract_duration", contract.1), ("relax_duration", relax.1)]
             }
             Self::Wrapping { Tsa, tpwave } => vec![("Tsa", *Tsa), ("tpwave", *tpwave)],
-            Self::Fourier => Vec::new(),
+            Self::TwoHill { times, powers, .. } => {
+                let names = ["tau_1", "tau_2", "m1", "m2"];
+                names.into_iter().zip(times.iter().chain(powers).copied()).collect()
+            }
+            Self::Fourier | Self::FourierFromZero => Vec::new(),
         };
         match lengths.into_iter().find(|(_, value)| !(*value > 0.0 && value.is_finite())) {
-            Some((key, value)) => Err(format!("{key} is {value}: give a time above zero")),
+            Some((key, value)) => Err(format!("{key} is {value}: give a number above zero")),
             None => Ok(()),
         }
     }
@@ -74,10 +84,25 @@ impl Shape {
     /// The activation over one period.
     pub(super) fn samples(&self, name: &str, period: f64) -> Samples {
         let times: Vec<f64> = (0..=INTERVALS).map(|k| period * k as f64 / INTERVALS as f64).collect();
-        let mut values: Vec<f64> = times.iter().map(|t| self.at(*t, period)).collect();
+        let (least, range) = self.scale(period);
+        let mut values: Vec<f64> = times.iter().map(|t| (self.at(*t, period) - least) / range).collect();
         // The end is the start of the next period.
         values[INTERVALS] = values[0];
         Samples { name: name.to_owned(), times, values }
+    }
+
+    /// What is zero in the activation, and how much above that is one.
+    fn scale(&self, period: f64) -> (f64, f64) {
+        let courses = || (0..FINE).map(|k| self.at(period * k as f64 / FINE as f64, period));
+        let most = || courses().fold(f64::MIN_POSITIVE, f64::max);
+        match self {
+            Self::TwoHill { .. } => (0.0, most()),
+            Self::FourierFromZero => {
+                let least = courses().fold(f64::INFINITY, f64::min);
+                (least, most() - least)
+            }
+            _ => (0.0, 1.0),
+        }
     }
 
     fn at(&self, t: f64, period: f64) -> f64 {
@@ -102,7 +127,14 @@ impl Shape {
                 let before = (end - t).rem_euclid(period);
                 if before <= length { bell(before / length) } else { 0.0 }
             }
-            Self::Fourier => {
+            Self::TwoHill { shift, times, powers } => {
+                let since = (t - shift).rem_euclid(period);
+                let [rise, fall] = [0, 1].map(|k| (since / times[k]).powf(powers[k]));
+                // A power that is too large to write is one.
+                let risen = if rise.is_finite() { rise / (1.0 + rise) } else { 1.0 };
+                risen / (1.0 + fall)
+            }
+            Self::Fourier | Self::FourierFromZero => {
                 let angle = 2.0 * PI * t / period;
                 let modes = VENTRICLE.iter().enumerate().map(|(k, [cosine, sine])| {
                     let (sin, cos) = (k as f64 * angle).sin_cos();
@@ -129,6 +161,8 @@ mod tests {
             Shape::HalfCosine { active: 0.2, twitch: 0.3 },
             Shape::Cosines { contract: (0.2, 0.1), relax: (0.3, 0.3) },
             Shape::Wrapping { Tsa: 0.4, tpwave: 9.0 },
+            Shape::TwoHill { shift: 0.2, times: [0.2, 0.4], powers: [1.5, 20.0] },
+            Shape::FourierFromZero,
         ];
         for shape in shapes {
             let samples = shape.samples("a", 1.0);

@@ -1,14 +1,14 @@
-//! Vessels, junctions and boundary conditions of a file as elements of a network.
+//! Boundary conditions of a file as elements of a network, and what joins its blocks.
 //!
-//! The equations are those of the documentation of svZeroDSolver: a `BloodVessel` is a resistance with
-//! stenosis, a capacitor behind it and an inertance; a `BloodVesselCRL` has the capacitor at its inlet. Next files to
-//! read: [`super::junctions`] and [`super::heart`], then [`super::network`].
+//! The equations are those of the documentation of svZeroDSolver. Next files to read: [`super::vessels`], [`super::signal`],
+//! [`super::junctions`] and [`super::heart`], then [`super::network`].
 
 use std::collections::BTreeMap;
 
 use super::super::plan::{Samples, Unknown};
 use super::activation::Shape;
-use super::file::{Boundary, File, Flow, Pressure, Resistance, Vessel, VesselValues, typed};
+use super::file::{Boundary, File, Given, Resistance, typed};
+use super::formula::Formula;
 use super::heart::HeartNodes;
 use super::network::{GROUND, Kind, Network, Node, Series};
 
@@ -22,6 +22,8 @@ pub(super) const RESISTANCE: &str = "dyn s/cm^5";
 pub(super) struct Blocks {
     pub(super) network: Network,
     pub(super) courses: Vec<Samples>,
+    /// Inputs that are expressions, with their places.
+    pub(super) formulas: Vec<(String, Formula, String)>,
     pub(super) channels: Vec<(String, &'static str)>,
     pub(super) unknowns: Vec<Unknown>,
     /// Inlet and outlet of every vessel, by its name; nothing where nothing is joined yet.
@@ -53,6 +55,7 @@ impl Blocks {
         let mut blocks = Self {
             network: Network::new(),
             courses: Vec::new(),
+            formulas: Vec::new(),
             channels: Vec::new(),
             unknowns: Vec::new(),
             ends: BTreeMap::new(),
@@ -144,32 +147,6 @@ impl Blocks {
         Series { resistance, stenosis, capacity: 0.0, inertance }
     }
 
-    fn vessel(&mut self, vessel: &Vessel, place: &str) -> Result<(), String> {
-        let name = &vessel.vessel_name;
-        let [Some(from), Some(to)] = self.ends[name] else {
-            let end = if self.ends[name][0].is_none() { "inlet" } else { "outlet" };
-            return Err(format!("{place}: nothing is joined to the {end} of `{name}`"));
-        };
-        let values: VesselValues =
-            typed(&format!("{place}.zero_d_element_values"), &vessel.zero_d_element_values)?;
-        let mut series = Self::of(values.R_poiseuille, values.stenosis_coefficient, values.L);
-        match vessel.zero_d_element_type.as_str() {
-            "BloodVessel" => series.capacity = values.C,
-            "BloodVesselCRL" if values.C > 0.0 => {
-                let kind = Kind::Capacitor { value: values.C, outside: None };
-                self.network.add(&format!("{name}_wall"), kind, from, GROUND);
-            }
-            "BloodVesselCRL" if values.C == 0.0 => {}
-            "BloodVesselCRL" => return Err(format!("{place}: C is {}: give zero or more", values.C)),
-            other => {
-                return Err(format!(
-                    "{place}: a vessel of type `{other}` is not in `rcr-network` (known: BloodVessel, BloodVesselCRL)"
-                ));
-            }
-        }
-        self.network.series(name, series, from, to)
-    }
-
     fn boundary(&mut self, boundary: &Boundary, place: &str) -> Result<(), String> {
         let (name, values) = (boundary.bc_name.as_str(), &boundary.bc_values);
         let own = format!("{place}.bc_values");
@@ -202,16 +179,16 @@ impl Blocks {
         }
         match boundary.bc_type.as_str() {
             "FLOW" => {
-                let Flow { t, Q } = typed(&own, values)?;
+                let given = Given::read(&own, "Q", values)?;
                 let (from, to) = if side == Side::Inlet { (GROUND, node) } else { (node, GROUND) };
                 let element = self.network.add(name, Kind::Flow, from, to);
-                self.course(&own, element, t, Q)?;
+                self.signal(&own, "Q", element, given)?;
                 self.channels.push((format!("p_{}", self.network.name(node)), PRESSURE));
             }
             "PRESSURE" => {
-                let Pressure { t, P } = typed(&own, values)?;
+                let given = Given::read(&own, "P", values)?;
                 let element = self.network.add(name, Kind::Pressure, GROUND, node);
-                self.course(&own, element.clone(), t, P)?;
+                self.signal(&own, "P", element.clone(), given)?;
                 self.channels.push((format!("q_{element}"), FLOW));
             }
             "RESISTANCE" => {
@@ -227,22 +204,6 @@ impl Blocks {
             }
             _ => self.coronary(&own, name, typed(&own, values)?, node)?,
         }
-        Ok(())
-    }
-
-    /// Adds the course of an input.
-    pub(super) fn course(
-        &mut self,
-        place: &str,
-        name: String,
-        times: Vec<f64>,
-        values: Vec<f64>,
-    ) -> Result<(), String> {
-        let course = Samples { name, times, values };
-        if let Some(fault) = course.fault() {
-            return Err(format!("{place}: {fault}"));
-        }
-        self.courses.push(course);
         Ok(())
     }
 }

@@ -4,6 +4,8 @@
 
 #![allow(non_snake_case)] // the file's own keys
 
+use serde_json::Value;
+
 use super::activation::Shape;
 use super::blocks::{Blocks, Side};
 use super::file::{Activation, Chamber, Cosines, File, Twitch, Valve, typed};
@@ -30,8 +32,10 @@ impl Blocks {
     }
 
     fn chamber(&mut self, chamber: &Chamber, place: &str) -> Result<(), String> {
-        let (law, own, inertance) = law(chamber, place)?;
-        let shape = chamber.activation_function.as_ref().map(shape).or(own);
+        let (values, inside) = chamber.split(place)?;
+        let (law, own, inertance) = law(&chamber.kind, &values, place)?;
+        let given = chamber.activation_function.as_ref().or(inside.as_ref());
+        let shape = given.map(shape).or(own);
         let shape = shape.ok_or_else(|| format!("{place}: `{}` has no activation", chamber.name))?;
         shape.check().map_err(|fault| format!("{place}: {fault}"))?;
         let name = &chamber.name;
@@ -76,6 +80,9 @@ impl Blocks {
                 return Err(format!("{place}: a `ValveTanh` has a `Steepness` above zero"));
             }
             ("PiecewiseValve", None) => Opening::Sharp,
+            ("RegazzoniValve", _) => {
+                return Err(format!("{place}: `RegazzoniValve` is an early name: write `PiecewiseValve`"));
+            }
             (other, _) => {
                 return Err(format!(
                     "{place}: a valve of type `{other}` is not in `rcr-network` (known: ValveTanh, PiecewiseValve)"
@@ -124,18 +131,18 @@ fn twitch_law(values: &Twitch, place: &str) -> Result<network::Chamber, String> 
 }
 
 /// The law of a chamber, the activation among its own values, and the inertance at its outlet.
-fn law(chamber: &Chamber, place: &str) -> Result<(network::Chamber, Option<Shape>, f64), String> {
+fn law(kind: &str, values: &Value, place: &str) -> Result<(network::Chamber, Option<Shape>, f64), String> {
     let own = format!("{place}.values");
-    match chamber.kind.as_str() {
+    match kind {
         "ChamberElastanceInductor" => {
-            let values: Twitch = typed(&own, &chamber.values)?;
+            let values: Twitch = typed(&own, values)?;
             let law = twitch_law(&values, &own)?;
             let cosine = values.t_active.zip(values.t_twitch);
             let shape = cosine.map(|(active, twitch)| Shape::HalfCosine { active, twitch });
             Ok((law, shape, values.Impedance))
         }
         "PiecewiseCosineChamber" | "LinearElastanceChamber" => {
-            let values: Cosines = typed(&own, &chamber.values)?;
+            let values: Cosines = typed(&own, values)?;
             let law = network::Chamber {
                 active: values.Epass + values.Emax,
                 passive: values.Epass,
@@ -148,6 +155,10 @@ fn law(chamber: &Chamber, place: &str) -> Result<(network::Chamber, Option<Shape
             let shape = contract.zip(relax).map(|(contract, relax)| Shape::Cosines { contract, relax });
             Ok((law, shape, 0.0))
         }
+        "RegazzoniChamber" => Err(format!(
+            "{place}: `RegazzoniChamber` is an early form of `PiecewiseCosineChamber` whose heart beats every 0.68966 s whatever the \
+             file's period: write `PiecewiseCosineChamber`"
+        )),
         other => Err(format!(
             "{place}: a chamber of type `{other}` is not in `rcr-network` (known: ChamberElastanceInductor, \
                      PiecewiseCosineChamber, LinearElastanceChamber)"
@@ -165,5 +176,9 @@ fn shape(activation: &Activation) -> Shape {
             }
         }
         Activation::Wrapping { Tsa, tpwave } => Shape::Wrapping { Tsa: *Tsa, tpwave: *tpwave },
+        Activation::TwoHill { t_shift, tau_1, tau_2, m1, m2 } => {
+            Shape::TwoHill { shift: *t_shift, times: [*tau_1, *tau_2], powers: [*m1, *m2] }
+        }
+        Activation::Fourier {} => Shape::FourierFromZero,
     }
 }

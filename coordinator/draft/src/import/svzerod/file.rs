@@ -5,10 +5,12 @@
 
 #![allow(clippy::struct_field_names, non_snake_case)] // the file's own keys
 
+mod given;
 mod heart;
 
 use std::collections::BTreeMap;
 
+pub(super) use given::Given;
 pub(super) use heart::{
     Activation, Chamber, ClosedCoronary, ClosedLoop, ClosedRcr, Cosines, Heart, Twitch, Valve,
 };
@@ -151,7 +153,7 @@ pub(super) struct Junction {
 }
 
 /// Values of a vessel.
-#[derive(Debug, Deserialize)]
+#[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct VesselValues {
     pub(super) R_poiseuille: f64,
@@ -161,6 +163,27 @@ pub(super) struct VesselValues {
     pub(super) L: f64,
     #[serde(default)]
     pub(super) stenosis_coefficient: f64,
+}
+
+/// Value of a `Resistance`.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct OneResistance {
+    pub(super) R: f64,
+}
+
+/// Value of a `Capacitance`.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct OneCapacitance {
+    pub(super) C: f64,
+}
+
+/// Value of an `Inductance`.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct OneInductance {
+    pub(super) L: f64,
 }
 
 /// Values of a junction of vessels, one per outlet.
@@ -178,22 +201,6 @@ pub(super) struct JunctionValues {
 #[serde(deny_unknown_fields)]
 pub(super) struct Resistances {
     pub(super) R: Vec<f64>,
-}
-
-/// A prescribed flow.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Flow {
-    pub(super) t: Vec<f64>,
-    pub(super) Q: Vec<f64>,
-}
-
-/// A prescribed pressure.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Pressure {
-    pub(super) t: Vec<f64>,
-    pub(super) P: Vec<f64>,
 }
 
 /// A resistance to a pressure.
@@ -233,6 +240,13 @@ pub(super) fn read(text: &str) -> Result<File, String> {
     let value: Value = serde_json::from_str(text).map_err(|error| format!("is no JSON: {error}"))?;
     if !value.is_object() {
         return Err("is no input of svZeroDSolver, which is a JSON object".to_owned());
+    }
+    for key in ["calibration_parameters", "y", "dy"] {
+        if value.get(key).is_some() {
+            return Err(format!(
+                "`{key}`: is an input of svZeroDCalibrator; import the file that the calibrator writes"
+            ));
+        }
     }
     if value.get("vessels").is_none() && value.get("boundary_conditions").is_none() {
         return Err(

@@ -5,11 +5,13 @@
 
 use super::super::plan::{Course, Origin};
 use super::blocks::Blocks;
-use super::file::{File, VesselValues, typed};
+use super::file::File;
 use super::network::{GROUND, Kind, Node};
 
 /// Cycles after which a network that is driven hardly knows where it started.
 const FORGET: usize = 10;
+/// Periods that the program runs in search of a steady state, which a network with chambers does not have: 31 steps of a tenth.
+const BEFORE: usize = 3;
 
 /// The states that the initial condition gives; what it does not name is zero.
 pub(super) fn states(
@@ -36,10 +38,18 @@ pub(super) fn states(
         );
         return Ok(Vec::new());
     }
-    if course.from == Origin::Steady {
+    if course.from == Origin::Steady && course.all {
         notes.push(
-            "a network with chambers starts from `initial_condition`, not from a steady state".to_owned(),
+            "a network with chambers starts from `initial_condition`; the program runs some three periods under the means of the inputs \
+             before (steady_initial), which the first of the periods shown know"
+                .to_owned(),
         );
+    } else if course.from == Origin::Steady {
+        course.cycles += BEFORE;
+        notes.push(format!(
+            "a network with chambers starts from `initial_condition`; for the {BEFORE} periods under the means of the inputs that the program \
+             runs before (steady_initial), as many more are run"
+        ));
     }
     course.from = Origin::Zero;
     let mut states = Vec::new();
@@ -95,13 +105,13 @@ fn blood(blocks: &Blocks, vessel: &str) -> Option<String> {
 /// The capacitor of a vessel behind its resistance, and the pressure drop up to it at the flow that the file gives.
 fn behind(file: &File, blocks: &Blocks, vessel: &str) -> Result<Option<(String, f64)>, String> {
     let Some(found) = file.vessels.iter().find(|v| v.vessel_name == vessel) else { return Ok(None) };
-    let values: VesselValues = typed(vessel, &found.zero_d_element_values)?;
+    let values = found.values(vessel)?;
     let wall = format!("{vessel}_wall");
     let Some(element) = blocks.network.elements.iter().find(|e| e.name == wall) else { return Ok(None) };
     let inflow = |key: &&String| key.starts_with("flow:") && key.ends_with(&format!(":{vessel}"));
     let flow = file.initial_condition.keys().find(inflow).map_or(0.0, |key| file.initial_condition[key]);
     let state = format!("stored_p_{}", blocks.network.name(element.from));
-    let drop = if found.zero_d_element_type == "BloodVessel" { values.R_poiseuille * flow } else { 0.0 };
+    let drop = if found.zero_d_element_type == "BloodVesselCRL" { 0.0 } else { values.R_poiseuille * flow };
     Ok(Some((state, drop)))
 }
 

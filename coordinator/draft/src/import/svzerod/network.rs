@@ -154,7 +154,9 @@ impl Network {
             .elements
             .iter()
             .filter_map(|element| match element.kind {
-                Kind::Pressure | Kind::Constant(_) => Some(self.root(element.to)),
+                Kind::Pressure | Kind::Constant(_) if self.root(element.from) == GROUND => {
+                    Some(self.root(element.to))
+                }
                 Kind::Chamber(_) => Some(self.root(element.from)),
                 _ => None,
             })

@@ -3,7 +3,9 @@
 //! Next file to read: [`super::super::heart`].
 
 use serde::Deserialize;
-use serde_json::Value;
+use serde_json::{Map, Value};
+
+use super::typed;
 
 /// A closed loop; what `parameters` may hold follows from its type.
 #[derive(Debug, Deserialize)]
@@ -120,6 +122,47 @@ pub(in super::super) enum Activation {
     Piecewise { contract_start: f64, relax_start: f64, contract_duration: f64, relax_duration: f64 },
     #[serde(rename = "wrapping_cosine")]
     Wrapping { Tsa: f64, tpwave: f64 },
+    #[serde(rename = "two_hill")]
+    TwoHill { t_shift: f64, tau_1: f64, tau_2: f64, m1: f64, m2: f64 },
+    #[serde(rename = "fourier")]
+    Fourier {},
+}
+
+/// Activations by the numbers that some versions have for them among the values of a chamber (`activation_type`).
+const NUMBERED: [&str; 3] = ["half_cosine", "piecewise_cosine", "two_hill"];
+/// Keys of these activations.
+const OF_ACTIVATION: [&str; 11] = [
+    "t_active",
+    "t_twitch",
+    "contract_start",
+    "relax_start",
+    "contract_duration",
+    "relax_duration",
+    "t_shift",
+    "tau_1",
+    "tau_2",
+    "m1",
+    "m2",
+];
+
+impl Chamber {
+    /// Its values, and the activation that some versions have among them with its number.
+    pub(in super::super) fn split(&self, place: &str) -> Result<(Value, Option<Activation>), String> {
+        let Some(number) = self.values.get("activation_type") else { return Ok((self.values.clone(), None)) };
+        let place = format!("{place}.values");
+        let kind = number.as_u64().and_then(|number| NUMBERED.get(usize::try_from(number).ok()?));
+        let kind = kind.ok_or_else(|| {
+            format!("{place}.activation_type: {number} is not 0, 1 or 2 ({})", NUMBERED.join(", "))
+        })?;
+        let (mut values, mut activation) = (Map::new(), Map::new());
+        activation.insert("type".to_owned(), Value::from(*kind));
+        for (key, value) in self.values.as_object().into_iter().flatten() {
+            let part = if OF_ACTIVATION.contains(&key.as_str()) { &mut activation } else { &mut values };
+            part.insert(key.clone(), value.clone());
+        }
+        values.remove("activation_type");
+        Ok((Value::Object(values), Some(typed(&place, &Value::Object(activation))?)))
+    }
 }
 
 /// Values of a `ChamberElastanceInductor`.
