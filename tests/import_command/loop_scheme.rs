@@ -23,7 +23,8 @@ fn the_programs_closed_loop_differs_by_its_steps() {
         let (times, wanted) = results("closedLoopHeart_singleVessel", VESSEL, column);
         let most = difference(&own, column, &times, &wanted);
         assert!(most < 1e-9, "{column}: the scheme is off its results by {most}");
-        let [coarse, closer] = [&own, &quarter].map(|of| difference(of, column, &fine["time"], &fine[column]));
+        let [coarse, closer] =
+            [&own, &quarter].map(|of| difference(of, column, &fine["time"], &fine[column]));
         assert!(coarse > 0.1 && closer < 0.1 * coarse, "{column}: {coarse}, then {closer}");
     }
 }

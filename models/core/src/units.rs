@@ -6,10 +6,12 @@
 
 mod labels;
 mod parse;
+mod products;
 mod system;
 mod table;
 
 pub use labels::{Labels, Mismatch};
+pub use products::product;
 pub use system::consistent;
 
 /// Symbols of the base units, in the order of [`Unit::exponents`].
@@ -96,9 +98,8 @@ impl Unit {
 
     /// A label for the unit: a familiar one where there is one, else base units behind the factor.
     pub fn text(&self) -> String {
-        let fits = |label: &&&str| Self::parse(label).is_some_and(|unit| unit.same(self));
-        if let Some(label) = FAMILIAR.iter().find(fits) {
-            return (*label).to_owned();
+        if let Some(label) = self.familiar() {
+            return label.to_owned();
         }
         let part = |sign: f64| -> Vec<String> {
             let raised = |(symbol, e): (&&str, &f64)| {
@@ -114,14 +115,24 @@ impl Unit {
         if scaled {
             above.insert(0, rounded(self.factor, 6).to_string());
         }
-        match (above.is_empty(), below.as_slice()) {
-            (true, []) => "a plain number".to_owned(),
-            (true, [one]) => format!("1/{one}"),
-            (true, many) => format!("1/({})", many.join(" ")),
-            (false, []) => above.join(" "),
-            (false, [one]) => format!("{}/{one}", above.join(" ")),
-            (false, many) => format!("{}/({})", above.join(" "), many.join(" ")),
-        }
+        quotient(&above, &below)
+    }
+
+    /// The familiar label that fits.
+    fn familiar(&self) -> Option<&'static str> {
+        let fits = |label: &&&str| Self::parse(label).is_some_and(|unit| unit.same(self));
+        FAMILIAR.iter().find(fits).copied()
+    }
+}
+
+/// Factors over factors as a label that can be read again.
+fn quotient(above: &[String], below: &[String]) -> String {
+    let above = if above.is_empty() { "1".to_owned() } else { above.join(" ") };
+    match below {
+        [] if above == "1" => "a plain number".to_owned(),
+        [] => above,
+        [one] => format!("{above}/{one}"),
+        many => format!("{above}/({})", many.join(" ")),
     }
 }
 

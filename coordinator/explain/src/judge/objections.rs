@@ -98,8 +98,8 @@ pub(crate) fn objection(
     }
     if judged.kinds().iter().any(|kind| kind.is_of_no_field()) {
         return Some(format!(
-            "`{name}` comes nearest, but what is left is not noise, and a term without a field of its own is named only where it \
-             leaves nothing else"
+            "`{name}` comes nearest, but what is left is not noise: it describes a dependence and not its cause, and such a term is \
+             named only where it leaves nothing else"
         ));
     }
     correlated(cache, found, judged)

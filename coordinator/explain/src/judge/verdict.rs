@@ -103,12 +103,17 @@ pub(crate) fn decide(
     let judged = &found.judged[best];
     let (mut tied, synonyms) = class(cache, found, candidates, judged, &mut rivals)?;
     if !is_tested {
-        tied.push(vec![format!("another form of {}", judged.fit.variant.name())]);
+        tied.push(vec![another_form(&judged.fit.variant.name())]);
     }
     tied.extend(limits(judged).into_iter().map(|limit| vec![limit]));
     let verdict = if tied.is_empty() { Verdict::Named } else { Verdict::Tie };
     let because = String::new();
     Ok(Decision { verdict, best: Some(best), checked: Some(checked), tied, rivals, synonyms, because })
+}
+
+/// What stands for every form of a dependence that the data would not tell from what is named.
+pub(crate) fn another_form(name: &str) -> String {
+    format!("another form of {name}")
 }
 
 /// What is told of a class. What was the best takes its place among the rivals.

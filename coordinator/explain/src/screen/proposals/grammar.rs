@@ -6,7 +6,7 @@
 
 use starlings_models::effect::library::{MOST_SIGN_WIDTH, SIGN_WIDTH};
 use starlings_models::effect::{Addition, EffectParameter};
-use starlings_models::units::Unit;
+use starlings_models::units;
 use starlings_models::{EffectDef, Quantity, Role};
 use starlings_study::Study;
 
@@ -195,22 +195,13 @@ impl Equation<'_> {
         self.made.push(EffectDef { name, says, adds, parameters, ..EffectDef::default() });
     }
 
-    /// The label of the rate's unit over that of a term's factors; empty where one of them has none that can be read.
+    /// The label of the rate's unit over that of a term's factors, in their symbols; empty where one of them has none that can be read.
     fn unit(&self, factors: &[(&str, f64)]) -> String {
         let mut all = vec![(self.state.unit.as_str(), 1.0), (self.time, -1.0)];
         all.extend(
             factors.iter().filter(|(_, power)| power.abs() > 0.0).map(|(label, power)| (*label, -power)),
         );
-        let mut unit = Unit { factor: 1.0, exponents: [0.0; 7] };
-        let one = unit;
-        for (label, power) in all {
-            let Some(of) = Unit::parse(label) else { return String::new() };
-            unit.factor *= of.factor.powf(power);
-            for (sum, exponent) in unit.exponents.iter_mut().zip(of.exponents) {
-                *sum += power * exponent;
-            }
-        }
-        if unit.same(&one) { String::new() } else { unit.text() }
+        units::product(&all)
     }
 }
 
