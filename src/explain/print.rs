@@ -74,7 +74,8 @@ fn described(effect: &NamedEffect, states: &[String]) -> String {
 }
 
 fn coefficient(value: &Coefficient) -> String {
-    let unit = if value.unit.is_empty() { String::new() } else { format!(" {}", value.unit) };
+    let unit =
+        if matches!(value.unit.as_str(), "" | "1") { String::new() } else { format!(" {}", value.unit) };
     if value.sd > 0.0 {
         let sd = Some(value.sd);
         let [lo, hi] = value.interval95.map(|v| number(v, sd));

@@ -23,8 +23,9 @@ pub(crate) fn significant(value: f64, digits: i32) -> String {
     }
 }
 
-/// `value` to three significant digits, with its unit.
+/// `value` to three significant digits, with its unit; of a plain number (`1`) that is none.
 pub(crate) fn quantity(value: f64, unit: &str) -> String {
+    let unit = if unit == "1" { "" } else { unit };
     format!("{} {unit}", significant(value, 3)).trim_end().to_owned()
 }
 

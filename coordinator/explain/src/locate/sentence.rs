@@ -5,7 +5,7 @@
 use super::region::{Bound, Region};
 use super::residuals::Residuals;
 use super::signal::{Kind, Signal};
-use crate::number::{percent, three, threshold};
+use crate::number::{percent, spaced, three, threshold};
 use crate::rows::Usage;
 
 /// The figures of a place.
@@ -36,7 +36,7 @@ pub(super) fn region_words(region: &Region, signals: &[Signal], several_records:
 
 fn bound_words(bound: &Bound, signal: &Signal) -> String {
     let name = if signal.kind == Kind::Size { format!("|{}|", signal.name) } else { signal.name.clone() };
-    let unit = unit(&signal.unit);
+    let unit = spaced(&signal.unit);
     let number = |v: f64| threshold(v, signal.range);
     match (bound.from.is_finite(), bound.to.is_finite()) {
         (true, true) => format!("{} < {name} < {}{unit}", number(bound.from), number(bound.to)),
@@ -46,13 +46,9 @@ fn bound_words(bound: &Bound, signal: &Signal) -> String {
     }
 }
 
-fn unit(label: &str) -> String {
-    if label.is_empty() { String::new() } else { format!(" {label}") }
-}
-
 /// A span of time in words: from, to, or both.
 fn span_words(bound: &Bound, signal: &Signal) -> String {
-    let unit = unit(&signal.unit);
+    let unit = spaced(&signal.unit);
     let number = |v: f64| threshold(v, signal.range);
     match (bound.from.is_finite(), bound.to.is_finite()) {
         (true, true) => format!("from t = {} to {}{unit}", number(bound.from), number(bound.to)),
@@ -107,7 +103,7 @@ pub(super) fn sentence(
     if figures.share < 0.995 {
         text = format!("{text} ({} of the samples)", percent(figures.share));
     }
-    let unit = unit(&group.unit);
+    let unit = spaced(&group.unit);
     let (rmse, expected) = (three(figures.rmse), three(figures.expected));
     text = format!("{text}: {rmse}{unit} rms against {expected} expected");
     if figures.bias.abs() > 0.5 * figures.rmse {

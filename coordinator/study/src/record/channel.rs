@@ -177,5 +177,5 @@ impl ChannelReader<'_> {
 
 pub(super) fn with_unit(value: f64, unit: &str) -> String {
     let text = rounded(value, 4).to_string();
-    if unit.is_empty() { text } else { format!("{text} {unit}") }
+    if matches!(unit, "" | "1") { text } else { format!("{text} {unit}") }
 }
