@@ -8,7 +8,7 @@ mod infer_kit;
 use std::fmt::Write as _;
 use std::fs;
 
-use infer_kit::{STUDY, folder, followed, infer, recording};
+use infer_kit::{STUDY, coupled, folder, followed, infer, recording};
 use serde_json::Value;
 
 #[test]
@@ -29,6 +29,35 @@ fn a_change_is_an_alarm_where_it_happens_and_nowhere_else() {
     let (c, sd) = (last[0].as_f64().unwrap(), last[1].as_f64().unwrap());
     // As above: four sd and the error of Euler's path.
     assert!((c - 6.0).abs() < 4.0 * sd + 0.2, "after the change all is estimated anew: {c} ± {sd}");
+}
+
+#[test]
+fn a_change_that_no_block_shows_is_an_alarm_from_longer_stretches_and_located() {
+    // Two hundred steps tell a coupling of 4.5 instead of 3 by two or three units of χ², where an alarm takes more than thirty.
+    let dir = folder(STUDY, "");
+    let changed = coupled(40_000, 20_000, 4.5);
+    let read = |lines: &[String]| -> Vec<Value> {
+        lines.iter().map(|line| serde_json::from_str(line).unwrap()).collect()
+    };
+    let (code, whole, stderr) = followed(dir.path(), &changed, &[]);
+    assert_eq!(code, 0, "{stderr}");
+    let lines = read(&whole);
+    let alarms: Vec<&Value> = lines.iter().filter(|line| line["alarm"] == true).collect();
+    assert_eq!(alarms.len(), 1, "{alarms:?}");
+    let time = alarms[0]["time"].as_f64().unwrap();
+    let since = alarms[0]["test"]["since"].as_f64().unwrap();
+    assert!(time > 200.0 && time <= 280.0 && (since - 200.0).abs() <= 30.0, "{time}, {since}");
+    let last = &lines[199]["coefficients"]["c"];
+    let (c, sd) = (last[0].as_f64().unwrap(), last[1].as_f64().unwrap());
+    assert!((c - 4.5).abs() < 4.0 * sd + 0.2, "{c} ± {sd}");
+    // A restart between the change and its alarm goes on with the same lines.
+    let rows: Vec<&str> = changed.lines().collect();
+    let (_, mut parts, _) =
+        followed(dir.path(), &(rows[..22_150].join("\n") + "\n"), &["--state", "state.json"]);
+    parts.extend(followed(dir.path(), &changed, &["--state", "state.json"]).1);
+    assert_eq!(parts, whole);
+    let (_, steady, _) = followed(dir.path(), &recording(40_000, usize::MAX), &[]);
+    assert!(read(&steady).iter().all(|line| line["alarm"] == false));
 }
 
 #[test]

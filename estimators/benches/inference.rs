@@ -62,6 +62,7 @@ fn tanks(times: &[f64], rows: &[[f64; 3]]) {
         recent: 4,
         reference: Memory::Growing,
         least: 1500,
+        longer: false,
         rate: 1e-6,
         watched: vec![],
     };
@@ -85,8 +86,15 @@ fn follow(basis: &Arc<Basis>, block: u64, times: &[f64], rows: &[[f64; 3]]) {
         .and_then(|s| s.with("q2", &[("x2", "x2^2", 1.0)]))
         .and_then(|s| s.with("q3", &[("x3", "x3^2", 1.0)]))
         .and_then(|s| s.with("q4", &[("x3", "x2*x3", 1.0)]));
-    let following =
-        Following { block, recent: 4, reference: Memory::Growing, least: 500, rate: 1e-6, watched: vec![] };
+    let following = Following {
+        block,
+        recent: 4,
+        reference: Memory::Growing,
+        least: 500,
+        longer: false,
+        rate: 1e-6,
+        watched: vec![],
+    };
     let fit = Fit::new(Diffusion::Diagonal, 9);
     let mut detector = Detector::new(Arc::clone(basis), STEP, structure.unwrap(), fit, following).unwrap();
     for (time, row) in times.iter().zip(rows) {

@@ -20,6 +20,7 @@ mod expected;
 mod fit;
 mod function;
 mod functions;
+mod history;
 mod lagged;
 mod missing;
 mod noise_check;

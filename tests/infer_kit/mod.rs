@@ -47,6 +47,11 @@ channels = [ { column = "x", output = "x" }, { column = "z", output = "z" } ]
 
 /// Rows of two coupled decays under noise of a linear congruential generator; from row `change` on they are coupled twice as strongly.
 pub(crate) fn recording(n: usize, change: usize) -> String {
+    coupled(n, change, 6.0)
+}
+
+/// The same with any coupling from row `change` on, which before is 3.
+pub(crate) fn coupled(n: usize, change: usize, coupling: f64) -> String {
     let (mut state, mut x, mut z, h) = (1_u64, 0.0_f64, 0.0_f64, 0.01);
     let mut noise = || {
         // Twelve uniform numbers less six have a variance of one.
@@ -59,7 +64,7 @@ pub(crate) fn recording(n: usize, change: usize) -> String {
     let mut text = "time,x,z\n".to_owned();
     for k in 0..=n {
         writeln!(text, "{:?},{x:?},{z:?}", k as f64 / 100.0).unwrap();
-        let c = if k < change { 3.0 } else { 6.0 };
+        let c = if k < change { 3.0 } else { coupling };
         let (dx, dz) = (-2.0 * x + c * z, -c * x - z);
         (x, z) = (x + h * dx + 0.05 * noise(), z + h * dz + 0.05 * noise());
     }
@@ -94,9 +99,12 @@ pub(crate) fn followed(dir: &Path, data: &str, arguments: &[&str]) -> (i32, Vec<
     command.current_dir(dir).args(["infer", "study.toml", "--follow", "-"]).args(arguments);
     let mut child =
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    // A command that refuses a row reads no more.
-    let _ = child.stdin.take().unwrap().write_all(data.as_bytes());
-    let out = child.wait_with_output().unwrap();
+    let mut stdin = child.stdin.take().unwrap();
+    // Lines are read while rows are written, since a pipe holds few. A command that refuses a row reads no more.
+    let out = std::thread::scope(|scope| {
+        scope.spawn(move || stdin.write_all(data.as_bytes()));
+        child.wait_with_output().unwrap()
+    });
     let lines = String::from_utf8(out.stdout).unwrap().lines().map(str::to_owned).collect();
     (out.status.code().unwrap(), lines, String::from_utf8(out.stderr).unwrap())
 }

@@ -85,7 +85,9 @@ pub fn follow<R: Read>(
             continue;
         }
         after = f64::NEG_INFINITY;
-        let answer = follower.push(time, &values).map_err(|error| told_at(&rows, line, &error))?;
+        let answer = follower
+            .push(time, &values)
+            .map_err(|error| told_at(&rows, line - follower.rows_since(&error), &error))?;
         if let Some(answer) = answer {
             told(&answer)?;
             if let Some(file) = &source.state {

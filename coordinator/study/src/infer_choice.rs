@@ -94,7 +94,7 @@ pub struct FollowChoice {
     pub window: Option<usize>,
     /// Steps before the first test.
     pub least: usize,
-    /// Probability of a false alarm of one test.
+    /// Probability of a false alarm of the tests of one block.
     pub rate: f64,
 }
 

@@ -1,10 +1,13 @@
 //! Follows a recording row by row: estimates, and an alarm when the last steps no longer fit them.
 //!
 //! Rows are gathered in blocks; the last blocks are the recent window, and blocks that leave it join the reference, so that a change
-//! is compared with what was before it. The reference is estimated anew when it has grown by a hundredth. Read next: `change.rs`, the test.
+//! is compared with what was before it. The reference is estimated anew when it has grown by a hundredth. A change too small for the
+//! recent window is found by longer stretches, each against what came before it (`history.rs`); all tests of a block share the rate of
+//! false alarms (Bonferroni). Read next: `change.rs`, the test.
 
 use std::sync::Arc;
 
+use super::history::History;
 use super::sums::MOST;
 use super::{
     Basis, Change, Fit, InferenceError, Memory, Posterior, Stream, StreamState, Structure, Sums, Window,
@@ -22,7 +25,9 @@ pub struct Following {
     pub reference: Memory,
     /// Steps of the reference before the first test.
     pub least: u64,
-    /// Probability of a false alarm of one test.
+    /// Whether stretches of two, four, eight ... times as many blocks are tested too.
+    pub longer: bool,
+    /// Probability of a false alarm of the tests of one block.
     pub rate: f64,
     /// Coefficients that are watched, all where it is empty.
     pub watched: Vec<usize>,
@@ -33,10 +38,12 @@ pub struct Following {
 pub struct Report {
     /// Time of the last row.
     pub time: f64,
-    /// When the recent window starts.
+    /// When the stretch starts that was tested; of an alarm with longer stretches, when the change was.
     pub since: f64,
-    /// The test.
+    /// The test, the most improbable one of this block.
     pub change: Change,
+    /// Probability, at most, of such a test among those of a block without a change.
+    pub by_chance: f64,
     /// Whether it is an alarm.
     pub alarm: bool,
 }
@@ -50,6 +57,8 @@ pub struct Detector {
     following: Following,
     recent: Window,
     reference: Window,
+    /// What longer stretches are made of.
+    history: Option<History>,
     posterior: Option<Posterior>,
     in_block: u64,
     /// Steps that joined the reference since it was estimated.
@@ -62,6 +71,7 @@ pub struct DetectorState {
     stream: StreamState,
     recent: Window,
     reference: Window,
+    history: Option<History>,
     posterior: Option<Posterior>,
     in_block: u64,
     unused: u64,
@@ -94,6 +104,7 @@ impl Detector {
             fit,
             recent: Window::new(Memory::Sliding(following.recent)),
             reference: Window::new(following.reference),
+            history: following.longer.then(|| History::new(following.reference)),
             following,
             posterior: None,
             in_block: 0,
@@ -116,6 +127,9 @@ impl Detector {
         }
         self.in_block = 0;
         let block = self.stream.take()?;
+        if let Some(history) = &mut self.history {
+            history.push(block.clone())?;
+        }
         if let Some(older) = self.recent.push(block)? {
             self.unused += older.n_step();
             self.reference.push(older)?;
@@ -127,10 +141,25 @@ impl Detector {
         let Some((posterior, recent)) = self.posterior.as_ref().zip(self.recent.sums()) else {
             return Ok(None);
         };
-        let change = compare(posterior, &recent, &self.structure, &self.following.watched)?;
-        let alarm = change.is_alarm(self.following.rate);
-        let since = recent.span().map_or(time, |[from, _]| from);
-        Ok(Some(Report { time, since, change, alarm }))
+        let mut change = compare(posterior, &recent, &self.structure, &self.following.watched)?;
+        let mut since = recent.span().map_or(time, |[from, _]| from);
+        let mut per_block = 1.0;
+        if let Some(history) = &self.history {
+            per_block += 2.0 / self.following.recent.max(1) as f64;
+            for seam in history.due(self.following.recent) {
+                if let Some((from, longer)) = self.behind(history, seam)
+                    && longer.probability < change.probability
+                {
+                    (since, change) = (from, longer);
+                }
+            }
+        }
+        let by_chance = (per_block * change.probability).min(1.0);
+        let alarm = by_chance < self.following.rate;
+        if alarm {
+            since = self.changed().unwrap_or(since);
+        }
+        Ok(Some(Report { time, since, change, by_chance, alarm }))
     }
 
     /// The estimate of the reference, `None` while it is too short.
@@ -138,20 +167,32 @@ impl Detector {
         self.posterior.as_ref()
     }
 
-    /// The sums of the recent window.
-    pub fn recent(&self) -> Option<Sums> {
-        self.recent.sums()
+    /// The sums of the reference.
+    pub fn reference(&self) -> Option<Sums> {
+        self.reference.sums()
     }
 
-    /// Takes the recent window as the new reference, after a change.
+    /// Takes what came since the change of a report as the new reference: the recent window, or the blocks since the change was where
+    /// longer stretches are tested.
     ///
     /// # Errors
     /// As for [`Window::push`].
-    pub fn accept(&mut self) -> Result<(), InferenceError> {
-        self.reference = Window::new(self.following.reference);
-        for block in self.recent.drain() {
-            self.reference.push(block)?;
+    pub fn accept(&mut self, report: &Report) -> Result<(), InferenceError> {
+        let mut reference = Window::new(self.following.reference);
+        match &mut self.history {
+            Some(history) => {
+                for piece in history.forget_before(report.since) {
+                    reference.push(piece)?;
+                }
+                self.recent = Window::new(Memory::Sliding(self.following.recent));
+            }
+            None => {
+                for block in self.recent.drain() {
+                    reference.push(block)?;
+                }
+            }
         }
+        self.reference = reference;
         self.posterior = None;
         self.estimate()
     }
@@ -165,6 +206,7 @@ impl Detector {
             stream: self.stream.state()?,
             recent: self.recent.clone(),
             reference: self.reference.clone(),
+            history: self.history.clone(),
             posterior: self.posterior.clone(),
             in_block: self.in_block,
             unused: self.unused,
@@ -174,7 +216,7 @@ impl Detector {
     /// Puts a new detector where another one was; basis, structure, fit and following are the same.
     ///
     /// # Errors
-    /// As for [`Stream::resume`], [`Window::check`] and [`Posterior::check`].
+    /// As for [`Stream::resume`], [`Window::check`] and [`Posterior::check`]; `Damaged` where it has no longer stretches, or has them unasked.
     pub fn resume(mut self, state: DetectorState) -> Result<Self, InferenceError> {
         let basis = Arc::clone(self.stream.basis());
         if state.in_block.max(state.unused) > MOST {
@@ -182,11 +224,38 @@ impl Detector {
         }
         state.recent.check(&basis)?;
         state.reference.check(&basis)?;
+        if state.history.is_some() != self.history.is_some() {
+            return Err(InferenceError::Damaged { what: "the history of a recording" });
+        }
+        state.history.as_ref().map_or(Ok(()), |history| history.check(&basis))?;
         state.posterior.as_ref().map_or(Ok(()), |p| p.check(&self.structure))?;
         self.stream = Stream::resume(basis, state.stream)?;
-        (self.recent, self.reference) = (state.recent, state.reference);
+        (self.recent, self.reference, self.history) = (state.recent, state.reference, state.history);
         (self.posterior, self.in_block, self.unused) = (state.posterior, state.in_block, state.unused);
         Ok(self)
+    }
+
+    /// When what lies behind a seam begins, and its test against what lies before. Too few steps before a seam, or functions that are
+    /// not seen there, say nothing of it.
+    fn behind(&self, history: &History, seam: usize) -> Option<(f64, Change)> {
+        let (before, after) = history.parts(seam)?;
+        if before.n_step() < self.following.least {
+            return None;
+        }
+        let reference = match &self.posterior {
+            Some(near) => self.fit.update(&before, &self.structure, near),
+            None => self.fit.posterior(&before, &self.structure),
+        };
+        let change = compare(&reference.ok()?, &after, &self.structure, &self.following.watched).ok()?;
+        Some((after.span()?[0], change))
+    }
+
+    /// When the coefficients changed: the seam with the largest square of the score of what lies behind it.
+    fn changed(&self) -> Option<f64> {
+        let history = self.history.as_ref()?;
+        let tests = history.seams().filter_map(|seam| self.behind(history, seam));
+        let most = tests.max_by(|(_, a), (_, b)| a.statistic.total_cmp(&b.statistic));
+        most.map(|(since, _)| since)
     }
 
     fn estimate(&mut self) -> Result<(), InferenceError> {

@@ -4,6 +4,8 @@
 //! block keeps the last row for the next one, so the steps do not depend on where blocks are cut. Nothing is allocated per row.
 //! Steps must be equal within [`STEP_TOLERANCE`]. Read next: `products.rs`, how they are summed, and `sums.rs`, what they are added to.
 
+mod culprit;
+
 use std::sync::Arc;
 
 use nalgebra::DMatrix;
@@ -281,20 +283,5 @@ impl Stream {
             follows: self.follows,
         });
         Ok(())
-    }
-
-    /// The first function that is not finite among n steps.
-    fn culprit(&self, n: usize) -> InferenceError {
-        let first = self.row - n as u64 - 1;
-        for row in 0..n {
-            for (b, name) in self.basis.names().iter().enumerate() {
-                let value = self.columns[(row, b)];
-                if !value.is_finite() {
-                    return InferenceError::NonFinite { row: first + row as u64, what: name.clone(), value };
-                }
-            }
-        }
-        let what = "the square or a slope of a function";
-        InferenceError::NonFinite { row: first, what: what.into(), value: f64::INFINITY }
     }
 }

@@ -53,8 +53,15 @@ fn follow<const N: usize>(mut detector: Detector, h: f64, rows: &[[f64; N]]) -> 
 fn throat(rate: f64) -> Detector {
     let basis = motor::basis();
     let structure = motor::throat(&basis);
-    let following =
-        Following { block: 1, recent: 4, reference: Memory::Growing, least: 200, rate, watched: vec![] };
+    let following = Following {
+        block: 1,
+        recent: 4,
+        reference: Memory::Growing,
+        least: 200,
+        longer: false,
+        rate,
+        watched: vec![],
+    };
     Detector::new(basis, 0.001, structure, Fit::new(Diffusion::Full, 1), following).unwrap()
 }
 
@@ -110,6 +117,7 @@ fn the_opening_of_a_tank_is_detected_within_a_tenth_of_a_second() {
                 recent: 1,
                 reference: Memory::Growing,
                 least: 250,
+                longer: false,
                 rate: 1e-6,
                 watched: vec![k],
             };
@@ -137,6 +145,7 @@ fn a_term_that_appears_is_reported() {
         recent: 4,
         reference: Memory::Sliding(20),
         least: 250,
+        longer: false,
         rate: 1e-6,
         watched: vec![],
     };
@@ -159,9 +168,9 @@ fn an_accepted_change_is_the_new_reference() {
     let mut alarms = vec![];
     for (n, row) in rows.iter().enumerate() {
         let report = detector.push(n as f64 * 0.001, row).unwrap();
-        if report.is_some_and(|r| r.alarm) {
+        if let Some(report) = report.filter(|r| r.alarm) {
             alarms.push(n);
-            detector.accept().unwrap();
+            detector.accept(&report).unwrap();
         }
     }
     assert_eq!(alarms.len(), 1, "{alarms:?}");

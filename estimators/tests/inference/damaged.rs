@@ -76,7 +76,7 @@ proptest! {
         let basis = lorenz::basis();
         let structure: Structure = lorenz::seven(&basis);
         let following =
-            Following { block: 10, recent: 2, reference: Memory::Growing, least: 50, rate: 1e-3, watched: vec![] };
+            Following { block: 10, recent: 2, reference: Memory::Growing, least: 50, longer: true, rate: 1e-3, watched: vec![] };
         let detector = || {
             let fit = Fit::new(Diffusion::Full, 7);
             Detector::new(Arc::clone(&basis), H, structure.clone(), fit, following.clone()).unwrap()

@@ -169,8 +169,15 @@ fn windows_detectors_regressions_and_reduced_models_that_do_not_fit_are_refused(
     let coarse = sums(&basis, &walk(20), 0.2);
     assert_eq!(window.push(coarse), Err(InferenceError::Incompatible { what: "their step" }));
     assert_eq!(window.n_block(), 1, "what was refused was not taken");
-    let following =
-        Following { block: 1, recent: 1, reference: Memory::Growing, least: 10, rate: 0.0, watched: vec![] };
+    let following = Following {
+        block: 1,
+        recent: 1,
+        reference: Memory::Growing,
+        least: 10,
+        longer: false,
+        rate: 0.0,
+        watched: vec![],
+    };
     let fit = Fit::new(Diffusion::Full, 12);
     let refused = Detector::new(Arc::clone(&basis), 0.1, same(&basis), fit.clone(), following);
     assert_eq!(said(refused), "the rate of false alarms is 0: it must be positive and finite");

@@ -10,6 +10,7 @@ mod draws;
 mod errors;
 mod false_alarm;
 mod kit;
+mod longer;
 mod lorenz;
 mod measured;
 mod measurement;

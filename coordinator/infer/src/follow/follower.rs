@@ -38,6 +38,7 @@ impl<'a> Follower<'a> {
             recent: settings.recent,
             reference: memory,
             least: settings.least as u64,
+            longer: true,
             rate: settings.rate,
             watched: Vec::new(),
         };
@@ -73,8 +74,8 @@ impl<'a> Follower<'a> {
         }
         let block = self.stream.take()?;
         self.window.push(block)?;
-        if report.as_ref().is_some_and(|report| report.alarm) {
-            self.restart()?;
+        if let Some(report) = report.as_ref().filter(|report| report.alarm) {
+            self.restart(report)?;
         }
         let fitted = self.fitted();
         let fitted = self.known(fitted)?.flatten();
@@ -83,14 +84,13 @@ impl<'a> Follower<'a> {
         Ok(Some(self.line(report.as_ref())))
     }
 
-    /// After a change the last blocks are all that counts.
-    fn restart(&mut self) -> Result<(), InferenceError> {
-        let recent = self.detector.recent();
-        let accepted = self.detector.accept();
+    /// After a change the blocks since then are all that counts.
+    fn restart(&mut self, report: &Report) -> Result<(), InferenceError> {
+        let accepted = self.detector.accept(report);
         self.known(accepted)?;
         self.window = Window::new(self.asked.choice.follow.window.map_or(Memory::Growing, Memory::Sliding));
-        if let Some(recent) = recent {
-            self.window.push(recent)?;
+        if let Some(since) = self.detector.reference() {
+            self.window.push(since)?;
         }
         self.posterior = None;
         Ok(())
@@ -119,6 +119,14 @@ impl<'a> Follower<'a> {
         let structure = &self.asked.question.structure;
         let line = line::line(self.time, self.n_step, self.posterior.as_ref(), report, structure);
         Line { lag_corrected: self.lag_corrected, error: self.error.clone(), ..line }
+    }
+
+    /// Rows that were taken since the one at fault, whose functions are summed some rows later.
+    pub(super) fn rows_since(&self, error: &InferenceError) -> u64 {
+        match error {
+            InferenceError::NonFinite { row, .. } => self.stream.n_row().saturating_sub(row + 1),
+            _ => 0,
+        }
     }
 
     pub(super) fn saved(&mut self) -> Result<Saved, InferError> {

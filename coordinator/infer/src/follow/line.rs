@@ -28,16 +28,16 @@ pub struct Line {
     pub test: Option<Test>,
 }
 
-/// The test of the last blocks against those before.
+/// The test of the last blocks against those before: of stretches of several lengths the one that fits worst.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Test {
-    /// When the last blocks begin: a jump that raised an alarm lies behind it or shortly before.
+    /// When the stretch that was tested begins; of an alarm, when the change was.
     pub since: f64,
     /// Square of the score.
     pub statistic: f64,
     /// Directions that it has.
     pub degrees: usize,
-    /// Probability of a larger square without a change.
+    /// Probability, at most, of such a square in any of a block's tests without a change.
     pub probability: f64,
     /// The coefficient whose score is largest, with it.
     pub largest: Option<(String, f64)>,
@@ -62,7 +62,7 @@ pub(crate) fn line(
             since: report.since,
             statistic: report.change.statistic,
             degrees: report.change.degrees,
-            probability: report.change.probability,
+            probability: report.by_chance,
             largest: largest.map(|(p, score)| (name(*p), *score)),
             appeared: report.change.appeared.iter().map(|p| name(*p)).collect(),
         }

@@ -9,6 +9,23 @@ use super::pooled_noise::FOUND;
 use super::reader::ChannelReader;
 use crate::file::ChannelSection;
 
+/// Least noise beside the largest value, or beside one where all values are smaller, and the largest noise: beyond them squares of
+/// errors in units of the noise, or the noise's own, are no numbers.
+const LEAST: f64 = 1e-100;
+const MOST: f64 = 1e150;
+
+/// What is wrong with a standard deviation that the study gives for these values.
+pub(super) fn unusable<'a>(sd: f64, values: impl IntoIterator<Item = &'a f64>) -> Option<String> {
+    if sd.is_nan() || sd <= 0.0 {
+        return Some(format!("`noise` must be above zero, found {sd}"));
+    }
+    let size = values.into_iter().filter(|v| v.is_finite()).fold(1.0_f64, |size, v| size.max(v.abs()));
+    if sd < LEAST * size {
+        return Some(format!("`noise` is so small that squares of errors beside it overflow, found {sd:e}"));
+    }
+    (sd > MOST).then(|| format!("`noise` is so large that its square overflows, found {sd:e}"))
+}
+
 /// A standard deviation and how it was found.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Noise {
@@ -22,10 +39,9 @@ impl ChannelReader<'_> {
     /// The noise of a channel whose components have these values. Held-out rows of a trained record take no part.
     pub(super) fn noise(&self, section: &ChannelSection, parts: &[&[f64]], unit: &str) -> Option<Noise> {
         if let Some(sd) = *section.noise.get_ref() {
-            if sd > 0.0 {
+            let Some(message) = unusable(sd, parts.iter().copied().flatten()) else {
                 return Some(Noise { sd, how: "given in the study".to_owned(), found_from: None });
-            }
-            let message = format!("`noise` must be above zero, found {sd}");
+            };
             let help =
                 "give the standard deviation of the measurement error in the channel's unit, or \"auto\"";
             self.source.report_with(section.noise.span(), message, help);

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use starlings_models::{Role, Spec};
 
 use super::Context;
+use super::noise::unusable;
 use super::reader::{ChannelReader, measured_somewhere};
 use super::shapes::{NodeAtRest, Surfaces};
 use super::surface_files::SurfaceFiles;
@@ -184,9 +185,8 @@ impl ChannelReader<'_> {
     /// The noise of a surface is the scatter of its points along the normal; it cannot be found from the data.
     fn surface_noise(&self, section: &ChannelSection) -> Option<f64> {
         match *section.noise.get_ref() {
-            Some(sd) if sd > 0.0 => return Some(sd),
             Some(sd) => {
-                let message = format!("`noise` must be above zero, found {sd}");
+                let Some(message) = unusable(sd, []) else { return Some(sd) };
                 let help =
                     "give the standard deviation of the surface along its normal, in the unit of its points";
                 self.source.report_with(section.noise.span(), message, help);
