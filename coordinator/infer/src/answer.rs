@@ -58,8 +58,8 @@ impl Fitted {
         };
         let checks = if sums.n_pair() > 0 { noise_checks(sums, structure, &posterior)? } else { Vec::new() };
         let matters = checks.iter().any(|check| check.verdict == Verdict::Matters);
-        // What interpolation takes out of single steps, neighbouring ones have together.
         let is_auto = choice.measured == MeasuredChoice::Auto;
+        // What interpolation takes out of single steps, neighbouring ones have together.
         let mut lag_corrected = (matters && is_auto) || choice.resample;
         let freed = Fit { lag_corrected: true, ..fit.clone() };
         if lag_corrected {

@@ -1,7 +1,7 @@
 //! Whether the coefficients are the same throughout the recordings: what lies before a time as the reference, what lies behind it tested
 //! against it.
 //!
-//! Stretches of neighbouring blocks have sums of their own, a dozen at most whatever the length. At every seam between two of them the
+//! Stretches of neighbouring blocks have sums of their own, sixteen at most whatever the length. At every seam between two of them the
 //! score of what follows under the estimate of what lies before is asked (`estimators/src/inference/change.rs`); all seams share the rate
 //! of false alarms (Bonferroni). Next file to read: `words.rs`, which says it.
 
@@ -95,7 +95,8 @@ impl Stretches {
         let values = before.estimates.iter().zip(&after.estimates);
         let both = values.filter_map(|(a, b)| Some((&a.name, a.value?, b.value?)));
         let scored = both.map(|(name, a, b)| ((a.mean - b.mean).abs() / a.sd.hypot(b.sd), name, a, b));
-        let (score, name, a, b) = scored.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        let (score, name, a, b) =
+            scored.filter(|(score, ..)| score.is_finite()).max_by(|a, b| a.0.total_cmp(&b.0))?;
         let Stretch { record, from, .. } = self.kept[seam];
         let (before, after) = ([a.mean, a.sd], [b.mean, b.sd]);
         (score > SHOWS).then(|| Changed { record, from, by_chance, name: name.clone(), before, after })

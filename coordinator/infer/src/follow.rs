@@ -87,7 +87,7 @@ pub fn follow<R: Read>(
         after = f64::NEG_INFINITY;
         let answer = follower
             .push(time, &values)
-            .map_err(|error| told_at(&rows, line - follower.rows_since(&error), &error))?;
+            .map_err(|error| told_at(&rows, line.saturating_sub(follower.rows_since(&error)), &error))?;
         if let Some(answer) = answer {
             told(&answer)?;
             if let Some(file) = &source.state {

@@ -78,8 +78,10 @@ pub fn infer(
     let sums = gathered.levels.first();
     let coarse = sums.and_then(|sums| coarse(&asked, &fit, &answer, sums, cut, at));
     // Rows that were interpolated or hold large errors share them, which the test of a change takes for independent.
-    let is_plain =
-        !choice.resample && choice.prefactor && !matches!(choice.measured, MeasuredChoice::Known(_));
+    let is_plain = !choice.resample
+        && choice.prefactor
+        && !answer.lag_corrected
+        && !matches!(choice.measured, MeasuredChoice::Known(_));
     let changed = is_plain.then(|| gathered.stretches.changed(&fit, structure)).flatten();
     told_of(study, &asked, &gathered, &answer, cut, (convergence, missing, (coarse, changed)))
 }

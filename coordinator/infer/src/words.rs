@@ -3,6 +3,7 @@
 //! Next file to read: [`super::result`].
 
 use starlings_estimators::inference::{NoiseCheck, StepError, Verdict};
+use starlings_models::units::rounded;
 use starlings_study::infer_choice::{InferChoice, MeasuredChoice};
 
 use crate::answer::Answer;
@@ -162,21 +163,34 @@ pub(crate) fn of_change(changed: &Changed, record: &str, unit: &str) -> String {
         changed;
     let by_chance = if *by_chance < 1e-9 { "less than 1e-9".to_owned() } else { format!("{by_chance:.0e}") };
     format!(
-        "the coefficients are not the same throughout: {name} is {before:.4} (sd {sd_before:.2e}) before {from} {unit} of record `{record}` \
-         and {after:.4} (sd {sd_after:.2e}) from there on (by chance with probability {by_chance}), and the table mixes both: infer from a \
+        "the coefficients are not the same throughout: {name} is {} ± {} before {} {unit} of record `{record}` and {} ± {} from there on (by chance with probability {by_chance}), and the table mixes both: infer from a \
          span of them (`train`), or see when they change by `--follow`; where nothing did, the drift lacks a term or the noise is larger in \
-         some states than in others"
+         some states than in others",
+        known_to(*before, *sd_before),
+        rounded(*sd_before, 2),
+        rounded(*from, 6),
+        known_to(*after, *sd_after),
+        rounded(*sd_after, 2),
     )
+}
+
+/// A value with two digits of its uncertainty.
+fn known_to(value: f64, sd: f64) -> f64 {
+    let digits = (value.abs() / sd).log10().floor() + 2.0;
+    rounded(value, if digits.is_finite() { digits.clamp(1.0, 15.0) as usize } else { 6 })
 }
 
 /// A prior that the data contradict: by more than so many standard deviations of what the data add.
 const CONTRADICTS: f64 = 4.0;
+/// Share of a prior's variance that the data take away at least, where it is asked whether they contradict it.
+const LITTLE: f64 = 1e-4;
 
 /// Priors that the data contradict. The mean of the posterior lies from that of the prior by s₀² − s² of variance where both hold.
 fn of_priors(coefficients: &[CoefficientFound]) -> Vec<String> {
     let of = |found: &CoefficientFound| {
         let ([mean, wide], estimate, sd) = (found.prior?, found.at_step.or(found.estimate)?, found.sd?);
-        let moves = (wide * wide - sd * sd).max(1e-12 * wide * wide).sqrt();
+        // Where the data say next to nothing, or errors of the measurement widen what is told, nothing contradicts.
+        let moves = (wide * wide - sd * sd > LITTLE * wide * wide).then(|| (wide * wide - sd * sd).sqrt())?;
         let is_far = (estimate - mean).abs() > CONTRADICTS * moves;
         is_far.then(|| {
             format!(

@@ -29,14 +29,6 @@ pub struct Change {
     pub appeared: Vec<usize>,
 }
 
-impl Change {
-    /// Whether it is an alarm when one test in 1/`rate` may be a false one. Of m tests, also of overlapping windows, at most m
-    /// `rate` false alarms are expected.
-    pub fn is_alarm(&self, rate: f64) -> bool {
-        self.probability < rate
-    }
-}
-
 /// Compares recent steps with a reference, in the watched coefficients (all where `watched` is empty).
 ///
 /// # Errors

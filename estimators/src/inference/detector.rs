@@ -27,7 +27,7 @@ pub struct Following {
     pub least: u64,
     /// Whether stretches of two, four, eight ... times as many blocks are tested too.
     pub longer: bool,
-    /// Probability of a false alarm of the tests of one block.
+    /// Probability of a false alarm of the tests of one block, on average over blocks.
     pub rate: f64,
     /// Coefficients that are watched, all where it is empty.
     pub watched: Vec<usize>,
@@ -42,7 +42,7 @@ pub struct Report {
     pub since: f64,
     /// The test, the most improbable one of this block.
     pub change: Change,
-    /// Probability, at most, of such a test among those of a block without a change.
+    /// Probability, at most, of such a test among those of a block without a change, of which each has so many as all have on average.
     pub by_chance: f64,
     /// Whether it is an alarm.
     pub alarm: bool,

@@ -76,7 +76,7 @@ impl History {
         let half = (self.held() / 2).min(self.reach);
         let mut every = recent.max(1) as u64;
         let mut seams = Vec::new();
-        while 2 * every <= half && self.taken.is_multiple_of(every) {
+        while every <= half / 2 && self.taken.is_multiple_of(every) {
             seams.push(self.seam(2 * every));
             every *= 2;
         }
@@ -111,7 +111,8 @@ impl History {
     /// As for [`Sums::check`] and [`Sums::merge`]; `Damaged` counts.
     pub(crate) fn check(&self, basis: &Basis) -> Result<(), InferenceError> {
         let counted = self.pieces.iter().try_fold(0_u64, |sum, piece| sum.checked_add(piece.n_block));
-        if counted.is_none_or(|held| held > self.taken) || self.taken.max(self.reach) > MOST {
+        let is_empty = self.reach == 0 || self.pieces.iter().any(|piece| piece.n_block == 0);
+        if is_empty || counted.is_none_or(|held| held > self.taken) || self.taken.max(self.reach) > MOST {
             return Err(InferenceError::Damaged { what: "the number of blocks" });
         }
         let Some(first) = self.pieces.front() else { return Ok(()) };

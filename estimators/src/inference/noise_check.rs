@@ -34,7 +34,7 @@ pub struct NoiseCheck {
 }
 
 impl NoiseCheck {
-    /// Whether there are errors of the measurement at all, large or small: by chance in one of a hundred recordings without.
+    /// Whether there are errors of the measurement at all, large or small: by chance in one of a hundred equations without.
     pub fn is_sure(&self) -> bool {
         self.ratio > normal(PRESENT) * self.sd
     }

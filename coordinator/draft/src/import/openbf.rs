@@ -5,6 +5,7 @@
 mod file;
 mod vessel;
 
+use std::cmp::Ordering;
 use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::Path;
@@ -213,7 +214,7 @@ fn shared(file: &File) -> Result<Vec<(String, f64)>, String> {
 fn behind(vessels: &[Vessel]) -> Result<f64, String> {
     let mut outlets = vessels.iter().filter(|vessel| vessel.Cc.is_some());
     let Some(first) = outlets.next() else { return Ok(0.0) };
-    match outlets.find(|vessel| vessel.Pout.to_bits() != first.Pout.to_bits()) {
+    match outlets.find(|vessel| vessel.Pout.partial_cmp(&first.Pout) != Some(Ordering::Equal)) {
         None if first.Pout.is_finite() => Ok(first.Pout),
         None => Err(format!("vessel `{}`: Pout is {}: give a pressure", first.label, first.Pout)),
         Some(other) => Err(format!(

@@ -37,7 +37,7 @@ pub struct Test {
     pub statistic: f64,
     /// Directions that it has.
     pub degrees: usize,
-    /// Probability, at most, of such a square in any of a block's tests without a change.
+    /// Probability, at most, of such a square in any of a block's tests without a change, on average over blocks.
     pub probability: f64,
     /// The coefficient whose score is largest, with it.
     pub largest: Option<(String, f64)>,

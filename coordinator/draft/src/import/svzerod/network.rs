@@ -1,8 +1,8 @@
 //! The network that the blocks of a file make: elements between nodes, in the terms of `rcr-network`.
 //!
 //! Two things that svZeroDSolver solves as differential-algebraic equations are put in another form here, and noted: a
-//! capacitor whose pressure a source prescribes, and nodes whose pressure only inertances determine. Next file to read:
-//! [`super::layout`], which writes it.
+//! capacitor whose pressure a source prescribes, and nodes whose pressure only inertances determine; an inertance behind a flow source is
+//! put in another form by [`super::driven`]. Next file to read: [`super::layout`], which writes it.
 
 use super::super::plan::Omission;
 use crate::names::Names;

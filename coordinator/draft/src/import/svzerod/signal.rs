@@ -60,12 +60,12 @@ impl Blocks {
     }
 }
 
-/// The same from zero to its length, as the program reads times that begin elsewhere: what is before the first and behind the last
-/// lies on the lines through two.
+/// The same from zero to its length, as the program reads times that begin later: what is before the first lies on the line through the
+/// first two. Where that does not meet the end of the period, the course jumps there.
 fn from_zero(course: Samples) -> Samples {
     let n = course.times.len();
     let increases = course.times.windows(2).all(|pair| pair[1] > pair[0]);
-    if n < 2 || n != course.values.len() || !increases || course.fault().is_none() {
+    if n < 2 || n != course.values.len() || !increases || course.times[0] < 0.0 || course.fault().is_none() {
         return course;
     }
     let period = course.times[n - 1] - course.times[0];
@@ -76,11 +76,7 @@ fn from_zero(course: Samples) -> Samples {
     };
     let inside = course.times.iter().copied().filter(|t| *t > 0.0 && *t < period);
     let times: Vec<f64> = std::iter::once(0.0).chain(inside).chain([period]).collect();
-    let mut values: Vec<f64> = times.iter().map(|t| at(*t)).collect();
-    // There it is the start of the next period, which may be a little off on the other line.
-    if let Some(last) = values.last_mut() {
-        *last = at(0.0);
-    }
+    let values: Vec<f64> = times.iter().map(|t| at(*t)).collect();
     Samples { name: course.name, times, values }
 }
 
@@ -95,8 +91,10 @@ mod tests {
         };
         let late = course(&[0.5, 1.0, 2.5], &[1.0, 2.0, -1.0]);
         assert_eq!((late.times, late.values), (vec![0.0, 0.5, 1.0, 2.0], vec![0.0, 1.0, 2.0, 0.0]));
-        let early = course(&[-1.0, 0.0, 1.0], &[3.0, 0.0, 1.0]);
-        assert_eq!((early.times, early.values), (vec![0.0, 1.0, 2.0], vec![0.0, 1.0, 0.0]));
+        // Half a period of two samples, which jumps at its end.
+        let coarse = course(&[0.5, 1.0, 1.5], &[0.0, 1.0, 0.0]);
+        assert_eq!((coarse.times, coarse.values), (vec![0.0, 0.5, 1.0], vec![-1.0, 0.0, 1.0]));
+        assert!(course(&[-1.0, 0.0, 1.0], &[3.0, 0.0, 1.0]).fault().is_some(), "nothing is read before zero");
         let good = course(&[0.0, 1.0], &[1.0, 1.0]);
         assert_eq!(good.times, [0.0, 1.0]);
         assert!(course(&[0.5, 0.5], &[1.0, 1.0]).fault().is_some());
