@@ -89,8 +89,8 @@ mod tests {
         let course = |times: &[f64], values: &[f64]| {
             from_zero(Samples { name: String::new(), times: times.to_vec(), values: values.to_vec() })
         };
-        let late = course(&[0.5, 1.0, 2.5], &[1.0, 2.0, -1.0]);
-        assert_eq!((late.times, late.values), (vec![0.0, 0.5, 1.0, 2.0], vec![0.0, 1.0, 2.0, 0.0]));
+        let late = course(&[0.5, 1.0, 3.0], &[1.0, 2.0, -2.0]);
+        assert_eq!((late.times, late.values), (vec![0.0, 0.5, 1.0, 2.5], vec![0.0, 1.0, 2.0, -1.0]));
         // Half a period of two samples, which jumps at its end.
         let coarse = course(&[0.5, 1.0, 1.5], &[0.0, 1.0, 0.0]);
         assert_eq!((coarse.times, coarse.values), (vec![0.0, 0.5, 1.0], vec![-1.0, 0.0, 1.0]));
