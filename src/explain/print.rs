@@ -6,6 +6,7 @@ use std::path::Path;
 
 use starlings_coordinator::explain::result::{Coefficient, NamedEffect, Rejected};
 use starlings_coordinator::explain::{Explanation, Probabilities, Verdict};
+use starlings_models::units::spaced;
 
 use crate::console::{line, number, table, text};
 use crate::failure::Failure;
@@ -74,8 +75,7 @@ fn described(effect: &NamedEffect, states: &[String]) -> String {
 }
 
 fn coefficient(value: &Coefficient) -> String {
-    let unit =
-        if matches!(value.unit.as_str(), "" | "1") { String::new() } else { format!(" {}", value.unit) };
+    let unit = spaced(&value.unit);
     if value.sd > 0.0 {
         let sd = Some(value.sd);
         let [lo, hi] = value.interval95.map(|v| number(v, sd));

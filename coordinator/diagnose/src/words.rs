@@ -1,5 +1,7 @@
 //! What is said of a diagnosis: the sentence of the verdict, and what it is conditional on.
 
+use starlings_models::units::spaced;
+
 use crate::result::{AlarmFound, ScenarioFound, Verdict};
 
 /// The verdict as a sentence; `left` are the scenarios that are left, the likeliest first.
@@ -38,7 +40,7 @@ pub(crate) fn says(verdict: Verdict, alarm: &AlarmFound, left: &[&ScenarioFound]
 fn severity(of: &ScenarioFound) -> String {
     of.severity().map_or_else(String::new, |s| {
         let [lo, hi] = s.interval90.map(plain);
-        let unit = if s.unit.is_empty() { String::new() } else { format!(" {}", s.unit) };
+        let unit = spaced(&s.unit);
         format!(", {} {}{unit} (90 %: {lo} to {hi})", s.name, plain(s.estimate))
     })
 }

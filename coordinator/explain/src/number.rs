@@ -62,11 +62,6 @@ pub(crate) fn factor(ratio: f64) -> String {
     if (0.01..1000.0).contains(&ratio) { format!("{ratio:.2}") } else { three(ratio) }
 }
 
-/// A unit label with a space before it, as it follows a number; empty where there is none, and for `1`.
-pub(crate) fn spaced(unit: &str) -> String {
-    if matches!(unit, "" | "1") { String::new() } else { format!(" {unit}") }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -10,6 +10,7 @@ use std::path::Path;
 use serde::Serialize;
 use starlings_diagnose::Diagnosed;
 use starlings_diagnose::result::{Departure, ParameterFound, ScenarioFound};
+use starlings_models::units::spaced;
 use starlings_study::store::folder::write;
 
 use super::plot::figure::Slots;
@@ -102,7 +103,7 @@ fn scenario(s: &ScenarioFound) -> [String; 6] {
 /// An estimate with its interval.
 fn shown(p: &ParameterFound) -> String {
     let [lo, hi] = p.interval90.map(|v| number::with_sd(v, p.sd));
-    let unit = if p.unit.is_empty() { String::new() } else { format!(" {}", p.unit) };
+    let unit = spaced(&p.unit);
     format!("{}{unit} ({lo} to {hi})", number::with_sd(p.estimate, p.sd))
 }
 

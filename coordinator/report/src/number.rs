@@ -2,6 +2,8 @@
 //!
 //! Everything that is not finite becomes an en dash, so no page ever shows the text of an invalid number.
 
+use starlings_models::units::spaced;
+
 /// What stands where a number is not known.
 pub(crate) const ABSENT: &str = "–";
 
@@ -25,8 +27,7 @@ pub(crate) fn significant(value: f64, digits: i32) -> String {
 
 /// `value` to three significant digits, with its unit; of a plain number (`1`) that is none.
 pub(crate) fn quantity(value: f64, unit: &str) -> String {
-    let unit = if unit == "1" { "" } else { unit };
-    format!("{} {unit}", significant(value, 3)).trim_end().to_owned()
+    format!("{}{}", significant(value, 3), spaced(unit))
 }
 
 /// `value` as a tick of an axis whose ticks are `step` apart.

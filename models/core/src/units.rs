@@ -136,6 +136,11 @@ fn quotient(above: &[String], below: &[String]) -> String {
     }
 }
 
+/// A label as it follows a number, behind a blank; nothing for a plain number, whose label is empty or `1`.
+pub fn spaced(label: &str) -> String {
+    if matches!(label, "" | "1") { String::new() } else { format!(" {label}") }
+}
+
 /// `value` to so many significant digits, at least one: what is then written has no more of them.
 pub fn rounded(value: f64, digits: usize) -> f64 {
     // Written and read again, so that 0.30000000000000004 is 0.3.

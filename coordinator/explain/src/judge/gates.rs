@@ -5,6 +5,7 @@
 //! file to read: [`super::search_result`].
 
 use starlings_estimators::End;
+use starlings_models::units::spaced;
 
 use super::adequacy::Adequacy;
 use super::form::Leftover;
@@ -14,7 +15,7 @@ use super::range::at_edge;
 use super::uncertainty::allowances;
 use crate::fit::fitted_variant::FittedVariant;
 use crate::fit::kind::Kind;
-use crate::number::{spaced, three, times};
+use crate::number::{three, times};
 use crate::rows::{Row, Usage, unit};
 use crate::run_cache::RunCache;
 

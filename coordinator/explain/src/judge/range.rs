@@ -2,10 +2,12 @@
 //!
 //! Next file to read: [`super::gates`].
 
+use starlings_models::units::spaced;
+
 use super::gates::Refusal;
 use crate::fit::fitted_variant::FittedVariant;
 use crate::fit::model_variant::AddedEffect;
-use crate::number::{spaced, three};
+use crate::number::three;
 
 /// Distance from the end of a range, as a share of its width, within which an estimate counts as at the end.
 const EDGE: f64 = 0.005;

@@ -3,6 +3,7 @@
 //! Rates are differences of simulated signals and inputs, never of measured values. Next file to read: [`super::signal`].
 
 use starlings_estimators::quantiles::Z95;
+use starlings_models::units::spaced;
 use starlings_study::{Record, Study};
 
 use super::residuals::{Residuals, primary};
@@ -126,8 +127,8 @@ fn lagged(study: &Study, track: &Track, group: &Residuals, now: &[f64]) -> Optio
     let (lag, values) = best.1?;
     let span = longest.times.last()? - longest.times.first()?;
     let earlier = span * lag as f64 / (longest.times.len() - 1) as f64;
-    let unit = if study.time_unit.is_empty() { String::new() } else { format!(" {}", study.time_unit) };
-    let words = format!("{} {}{unit} earlier", track.name, crate::number::three(earlier));
+    let words =
+        format!("{} {}{} earlier", track.name, crate::number::three(earlier), spaced(&study.time_unit));
     Some(Candidate { words, values, steps: 3.0 })
 }
 

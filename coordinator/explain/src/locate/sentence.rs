@@ -2,10 +2,12 @@
 //!
 //! Next file to read: [`crate::number`].
 
+use starlings_models::units::spaced;
+
 use super::region::{Bound, Region};
 use super::residuals::Residuals;
 use super::signal::{Kind, Signal};
-use crate::number::{percent, spaced, three, threshold};
+use crate::number::{percent, three, threshold};
 use crate::rows::Usage;
 
 /// The figures of a place.

@@ -2,11 +2,12 @@
 //!
 //! Next file to read: [`super::words`].
 
+use starlings_models::units::spaced;
 use starlings_study::Study;
 
 use super::result::CorrelatedChannel;
 use crate::judge::noise_model::{LargerNoise, larger as larger_noise};
-use crate::number::{percent, spaced, three};
+use crate::number::{percent, three};
 use crate::rows::{Rows, unit};
 
 /// The outputs whose noise counts as correlated.

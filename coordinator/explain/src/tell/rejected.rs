@@ -2,12 +2,14 @@
 //!
 //! Nothing is decided here; the gates and the verdict have decided. Next file to read: [`crate::judge::gates`].
 
+use starlings_models::units::spaced;
+
 use super::result::Rejected;
 use crate::fit::candidate::Candidate;
 use crate::judge::misfit::Misfit;
 use crate::judge::search_result::SearchResult;
 use crate::judge::verdict::Decision;
-use crate::number::{spaced, three};
+use crate::number::three;
 use crate::screen::screening_result::ScreeningResult;
 
 /// What was refused, with reasons: refitted variants first, then candidates that failed, have no influence of their own, or

@@ -10,6 +10,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use starlings_models::effect::{EffectParameter, Scale, names, scale};
+use starlings_models::units::spaced;
 use starlings_models::{
     BuildSetup, EffectDef, Job, ObserverDef, ParticleError, SOLVER, Setup, SetupError, Spec, Stop, Until,
     Window,
@@ -218,7 +219,7 @@ fn elsewhere(file: &StudyFile, written: &EffectParameter, found: &EffectParamete
     };
     let beyond = found.scale == Scale::Absolute && lo < hi && !(lo..=hi).contains(&value);
     beyond.then(|| {
-        let unit = if written.unit.is_empty() { String::new() } else { format!(" {}", written.unit) };
+        let unit = spaced(&written.unit);
         format!(
             "{what} `{name}` is {value}{unit}, and a search would look from {lo:.4} to {hi:.4}: it counts on the course of \
              `{of}` in a run at the prior medians."

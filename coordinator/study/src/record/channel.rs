@@ -2,7 +2,7 @@
 //!
 //! Next files to read: [`super::part`] for fields, [`super::noise`], [`super::input`].
 
-use starlings_models::units::rounded;
+use starlings_models::units::{rounded, spaced};
 
 use super::Context;
 use super::derived::Derived;
@@ -176,6 +176,5 @@ impl ChannelReader<'_> {
 }
 
 pub(super) fn with_unit(value: f64, unit: &str) -> String {
-    let text = rounded(value, 4).to_string();
-    if matches!(unit, "" | "1") { text } else { format!("{text} {unit}") }
+    format!("{}{}", rounded(value, 4), spaced(unit))
 }
