@@ -9,6 +9,7 @@ use starlings_study::posterior;
 
 use super::correlated::{correlated_noise, listed as listed_noise};
 use super::errors::shrinking;
+use super::tie::tied;
 use crate::fit::candidate::Candidate;
 use crate::fit::fitted_variant::FittedVariant;
 use crate::fit::kind::Kind;
@@ -16,7 +17,7 @@ use crate::judge::adequacy::Nature;
 use crate::judge::gates::JudgedFit;
 use crate::judge::held_out::{HeldOut, listed};
 use crate::judge::search_result::SearchResult;
-use crate::judge::verdict::{Decision, Verdict, another_form};
+use crate::judge::verdict::{Decision, Verdict};
 use crate::locate::Located;
 use crate::number::{factor, percent, times};
 use crate::run_cache::RunCache;
@@ -64,7 +65,7 @@ pub(crate) fn headline(
         (Verdict::Tie, Some(judged)) => {
             format!(
                 "{}{}{} {}{}",
-                tied(judged, decision),
+                tied(&judged.fit.variant.name(), &subject(judged), &decision.tied),
                 likelier(judged, decision, candidates),
                 same(decision),
                 capital(&shrinking(cache, found, judged)),
@@ -78,25 +79,6 @@ pub(crate) fn headline(
         }
     };
     if noise.is_empty() { verdict } else { format!("{verdict} The noise is correlated in time: {noise}.") }
-}
-
-/// What explains the gap about equally well. That its exact form is open is another thing than a choice among names.
-fn tied(judged: &JudgedFit<'_>, decision: &Decision) -> String {
-    let name = judged.fit.variant.name();
-    let open = another_form(&name);
-    let (forms, named): (Vec<String>, Vec<String>) =
-        decision.tied.iter().map(|set| set.join(" + ")).partition(|set| *set == open);
-    match (forms.is_empty(), named.is_empty()) {
-        (_, true) => format!(
-            "{} These data show that it is there and not its exact form: others like it would fit as well.",
-            subject(judged)
-        ),
-        (false, false) => format!(
-            "{name} or {}: the data cannot tell them apart, nor the exact form of the first.",
-            named.join(" or ")
-        ),
-        (true, false) => format!("{name} or {}: the data cannot tell them apart.", named.join(" or ")),
-    }
 }
 
 /// That nothing explains the gap, why, what fails of what was held out, and what was not tried.

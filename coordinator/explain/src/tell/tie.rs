@@ -1,0 +1,44 @@
+//! The sentence of a tie: a choice among names, or one effect whose exact form is open.
+//!
+//! Next file to read: [`super::words`].
+
+use crate::judge::verdict::another_form;
+
+/// What explains the gap about equally well. That its exact form is open is another thing than a choice among names.
+pub(super) fn tied(name: &str, subject: &str, tied: &[Vec<String>]) -> String {
+    let open = another_form(name);
+    let (forms, named): (Vec<String>, Vec<String>) =
+        tied.iter().map(|set| set.join(" + ")).partition(|set| *set == open);
+    match (forms.is_empty(), named.is_empty()) {
+        (_, true) => format!(
+            "{subject} These data show that it is there and not its exact form: others like it would fit as well."
+        ),
+        (false, false) => format!(
+            "{name} or {}: the data cannot tell them apart, nor the exact form of the first.",
+            named.join(" or ")
+        ),
+        (true, false) => format!("{name} or {}: the data cannot tell them apart.", named.join(" or ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_open_form_is_another_thing_than_a_choice_among_names() {
+        let set = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<String>>();
+        let open = vec![another_form("drag")];
+        let alone = tied("drag", "Missing: drag. It brakes.", std::slice::from_ref(&open));
+        assert!(alone.starts_with("Missing: drag. It brakes. These data show that it is there"), "{alone}");
+        assert!(!alone.contains("apart"), "{alone}");
+        let pair = set(&["lag", "gain"]);
+        let names = tied("drag", "", std::slice::from_ref(&pair));
+        assert_eq!(names, "drag or lag + gain: the data cannot tell them apart.");
+        let both = tied("drag", "", &[open, pair]);
+        assert_eq!(
+            both,
+            "drag or lag + gain: the data cannot tell them apart, nor the exact form of the first."
+        );
+    }
+}
