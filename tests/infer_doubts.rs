@@ -7,7 +7,7 @@ mod infer_kit;
 
 use std::fmt::Write as _;
 
-use infer_kit::{STUDY, folder, infer, recording, refused};
+use infer_kit::{STUDY, folder, infer, noise, recording, refused};
 use serde_json::Value;
 
 /// Warnings that hold these words.
@@ -23,20 +23,10 @@ fn value(found: &Value, name: &str) -> [f64; 2] {
     ["estimate", "sd"].map(|key| one[key].as_f64().unwrap())
 }
 
-/// Numbers of mean zero and variance one.
-fn noise() -> impl FnMut() -> f64 {
-    let mut state = 7_u64;
-    let mut uniform = move || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 11) as f64 / (1_u64 << 53) as f64
-    };
-    move || (0..12).map(|_| uniform()).sum::<f64>() - 6.0
-}
-
 #[test]
 fn errors_so_small_that_only_a_long_recording_minds_them_are_taken_out_and_told() {
     let clean = recording(200_000, usize::MAX);
-    let mut noise = noise();
+    let mut noise = noise(7);
     let mut rows = clean.lines();
     let mut measured = format!("{}\n", rows.next().unwrap());
     for row in rows {
@@ -105,7 +95,7 @@ file = "data.csv"
 channels = [ { column = "x", output = "x" } ]
 "#;
     let path = |step: f64, n: usize| {
-        let (mut noise, keeps) = (noise(), (-5.0 * step).exp());
+        let (mut noise, keeps) = (noise(7), (-5.0 * step).exp());
         let (mut x, mut text) = (0.0, "time,x\n".to_owned());
         for k in 0..=n {
             writeln!(text, "{:?},{x:?}", (k as f64 * step * 1e6).round() / 1e6).unwrap();

@@ -9,6 +9,7 @@
 mod basis;
 mod change;
 mod coarse;
+mod constancy;
 mod decimation;
 mod detector;
 mod diffusion;
@@ -43,6 +44,7 @@ mod window;
 pub use basis::{Basis, Rule};
 pub use change::{Change, compare};
 pub use coarse::{StepError, noise_errors, step_errors, step_in_rates};
+pub use constancy::{Seam, most_changed};
 pub use decimation::{Decimation, Extrapolated, Strength, extrapolate};
 pub use detector::{Detector, DetectorState, Following, Report};
 pub use diffusion::Diffusion;

@@ -45,6 +45,17 @@ file = "data.csv"
 channels = [ { column = "x", output = "x" }, { column = "z", output = "z" } ]
 "#;
 
+/// Numbers of mean zero and variance one, of a linear congruential generator.
+pub(crate) fn noise(seed: u64) -> impl FnMut() -> f64 {
+    let mut state = seed;
+    let mut uniform = move || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    // Twelve uniform numbers less six have a variance of one.
+    move || (0..12).map(|_| uniform()).sum::<f64>() - 6.0
+}
+
 /// Rows of two coupled decays under noise of a linear congruential generator; from row `change` on they are coupled twice as strongly.
 pub(crate) fn recording(n: usize, change: usize) -> String {
     coupled(n, change, 6.0)
@@ -52,15 +63,7 @@ pub(crate) fn recording(n: usize, change: usize) -> String {
 
 /// The same with any coupling from row `change` on, which before is 3.
 pub(crate) fn coupled(n: usize, change: usize, coupling: f64) -> String {
-    let (mut state, mut x, mut z, h) = (1_u64, 0.0_f64, 0.0_f64, 0.01);
-    let mut noise = || {
-        // Twelve uniform numbers less six have a variance of one.
-        let uniform = |state: &mut u64| {
-            *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (*state >> 11) as f64 / (1_u64 << 53) as f64
-        };
-        (0..12).map(|_| uniform(&mut state)).sum::<f64>() - 6.0
-    };
+    let (mut noise, mut x, mut z, h) = (noise(1), 0.0_f64, 0.0_f64, 0.01);
     let mut text = "time,x,z\n".to_owned();
     for k in 0..=n {
         writeln!(text, "{:?},{x:?},{z:?}", k as f64 / 100.0).unwrap();

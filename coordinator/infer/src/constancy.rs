@@ -1,11 +1,9 @@
-//! Whether the coefficients are the same throughout the recordings: what lies before a time as the reference, what lies behind it tested
-//! against it.
+//! The sums of a recording by stretches, and where its coefficients change from one to the other.
 //!
-//! Stretches of neighbouring blocks have sums of their own, sixteen at most whatever the length. At every seam between two of them the
-//! score of what follows under the estimate of what lies before is asked (`estimators/src/inference/change.rs`); all seams share the rate
-//! of false alarms (Bonferroni). Next file to read: `words.rs`, which says it.
+//! Stretches of neighbouring blocks have sums of their own, sixteen at most whatever the length; the test of their seams is
+//! `estimators/src/inference/constancy.rs`. Next file to read: `words.rs`, which says what it finds.
 
-use starlings_estimators::inference::{Fit, InferenceError, Structure, Sums, compare};
+use starlings_estimators::inference::{Fit, InferenceError, Seam, Structure, Sums, most_changed};
 
 /// Stretches at most: two of them are made one where there would be more.
 const MOST: usize = 16;
@@ -73,31 +71,19 @@ impl Stretches {
 
     /// Where the coefficients change most, if they surely do.
     pub(crate) fn changed(&self, fit: &Fit, structure: &Structure) -> Option<Changed> {
-        let mut most: Option<(usize, f64)> = None;
-        for seam in 1..self.kept.len() {
-            let probability = || {
-                let reference = fit.posterior(&merged(&self.kept[..seam])?, structure)?;
-                compare(&reference, &merged(&self.kept[seam..])?, structure, &[])
-            };
-            // Too few steps before a seam, or functions that are not seen there, say nothing of it.
-            let Ok(change) = probability() else { continue };
-            if most.is_none_or(|(_, least)| change.probability < least) {
-                most = Some((seam, change.probability));
-            }
-        }
-        let (seam, probability) = most?;
-        let by_chance = (probability * (self.kept.len() - 1) as f64).min(1.0);
+        let pieces: Vec<&Sums> = self.kept.iter().map(|stretch| &stretch.sums).collect();
+        let Seam { piece, by_chance } = most_changed(&pieces, fit, structure)?;
         if by_chance >= FALSE_ALARM {
             return None;
         }
-        let side = |of: &[Stretch]| fit.posterior(&merged(of).ok()?, structure).ok();
-        let (before, after) = (side(&self.kept[..seam])?, side(&self.kept[seam..])?);
+        let side = |of: &[&Sums]| fit.posterior(&Sums::of(of.iter().copied()).ok()??, structure).ok();
+        let (before, after) = (side(&pieces[..piece])?, side(&pieces[piece..])?);
         let values = before.estimates.iter().zip(&after.estimates);
         let both = values.filter_map(|(a, b)| Some((&a.name, a.value?, b.value?)));
         let scored = both.map(|(name, a, b)| ((a.mean - b.mean).abs() / a.sd.hypot(b.sd), name, a, b));
         let (score, name, a, b) =
             scored.filter(|(score, ..)| score.is_finite()).max_by(|a, b| a.0.total_cmp(&b.0))?;
-        let Stretch { record, from, .. } = self.kept[seam];
+        let Stretch { record, from, .. } = self.kept[piece];
         let (before, after) = ([a.mean, a.sd], [b.mean, b.sd]);
         (score > SHOWS).then(|| Changed { record, from, by_chance, name: name.clone(), before, after })
     }
@@ -111,13 +97,4 @@ impl Stretch {
         self.n_block += n_block;
         Ok(())
     }
-}
-
-/// The sums of neighbouring stretches, of which there is one at least.
-fn merged(stretches: &[Stretch]) -> Result<Sums, InferenceError> {
-    let mut whole = stretches[0].sums.clone();
-    for stretch in &stretches[1..] {
-        whole.merge(&stretch.sums)?;
-    }
-    Ok(whole)
 }

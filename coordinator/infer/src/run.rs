@@ -83,7 +83,8 @@ pub fn infer(
         && !answer.lag_corrected
         && !matches!(choice.measured, MeasuredChoice::Known(_));
     let changed = is_plain.then(|| gathered.stretches.changed(&fit, structure)).flatten();
-    told_of(study, &asked, &gathered, &answer, cut, (convergence, missing, (coarse, changed)))
+    let beside = Beside { convergence, missing, coarse, changed };
+    told_of(study, &asked, &gathered, &answer, cut, beside)
 }
 
 /// Terms that the drift lacks, where they are looked for: compared on the held-out records too, where there are any.
@@ -223,8 +224,13 @@ fn cut(choice: &InferChoice, asked: &Asked<'_>, at: Start) -> Cut {
     }
 }
 
-/// Whether steps are coarse, and where coefficients change.
-type Doubts = (Option<Coarse>, Option<Changed>);
+/// What is told beside the answer.
+struct Beside {
+    convergence: Vec<Converging>,
+    missing: Option<MissingFound>,
+    coarse: Option<Coarse>,
+    changed: Option<Changed>,
+}
 
 /// The tables.
 fn told_of(
@@ -233,9 +239,10 @@ fn told_of(
     gathered: &Gathered,
     answer: &Answer,
     cut: Cut,
-    (convergence, missing, (coarse, changed)): (Vec<Converging>, Option<MissingFound>, Doubts),
+    beside: Beside,
 ) -> Result<Inference, InferError> {
     let choice = asked.choice;
+    let Beside { convergence, missing, coarse, changed } = beside;
     let structure = &asked.question.structure;
     let means = answer.means();
     let reduced =

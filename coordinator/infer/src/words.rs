@@ -163,9 +163,9 @@ pub(crate) fn of_change(changed: &Changed, record: &str, unit: &str) -> String {
         changed;
     let by_chance = if *by_chance < 1e-9 { "less than 1e-9".to_owned() } else { format!("{by_chance:.0e}") };
     format!(
-        "the coefficients are not the same throughout: {name} is {} ± {} before {} {unit} of record `{record}` and {} ± {} from there on (by chance with probability {by_chance}), and the table mixes both: infer from a \
-         span of them (`train`), or see when they change by `--follow`; where nothing did, the drift lacks a term or the noise is larger in \
-         some states than in others",
+        "the coefficients are not the same throughout: {name} is {} ± {} before {} {unit} of record `{record}` and {} ± {} from there on (by \
+         chance with probability {by_chance}), and the table mixes both: infer from a span of them (`train`), or see when they change by \
+         `--follow`; where nothing did, the drift lacks a term or the noise is larger in some states than in others",
         known_to(*before, *sd_before),
         rounded(*sd_before, 2),
         rounded(*from, 6),
@@ -217,6 +217,34 @@ fn listed(moved: &[StepError]) -> String {
     list.join(", ")
 }
 
+/// Errors of the measurement; small ones where they moved coefficients.
+fn of_errors(choice: &InferChoice, answer: &Answer) -> Option<String> {
+    let is_told =
+        |check: &&NoiseCheck| check.verdict == Verdict::Matters || (answer.lag_corrected && check.is_sure());
+    let of = |check: &NoiseCheck| {
+        format!(
+            "{} (ratio {:.3}, standard deviation about {:.2e})",
+            check.equation,
+            check.ratio,
+            check.measured.max(0.0).sqrt()
+        )
+    };
+    let list: Vec<String> = answer.checks.iter().filter(is_told).map(of).collect();
+    if list.is_empty() || matches!(choice.measured, MeasuredChoice::Known(_)) {
+        return None;
+    }
+    let done = if answer.lag_corrected {
+        "the noise was taken from neighbouring residuals, which frees it of them"
+    } else {
+        "measurement_noise = \"auto\" takes them out of the noise"
+    };
+    Some(format!(
+        "neighbouring residuals show errors of the measurement in {}: {done}; where they are large give measurement_noise = <sd>, \
+         which smooths",
+        list.join(", ")
+    ))
+}
+
 /// What is doubtful.
 pub(crate) fn warnings(
     choice: &InferChoice,
@@ -233,31 +261,7 @@ pub(crate) fn warnings(
         );
     }
     warnings.extend(of_priors(&answer.coefficients(choice)));
-    // Small errors are told where they moved coefficients.
-    let is_told =
-        |check: &&NoiseCheck| check.verdict == Verdict::Matters || (answer.lag_corrected && check.is_sure());
-    let noisy: Vec<&NoiseCheck> = answer.checks.iter().filter(is_told).collect();
-    if !noisy.is_empty() && !matches!(choice.measured, MeasuredChoice::Known(_)) {
-        let of = |check: &&NoiseCheck| {
-            format!(
-                "{} (ratio {:.3}, standard deviation about {:.2e})",
-                check.equation,
-                check.ratio,
-                check.measured.max(0.0).sqrt()
-            )
-        };
-        let list: Vec<String> = noisy.iter().map(of).collect();
-        let done = if answer.lag_corrected {
-            "the noise was taken from neighbouring residuals, which frees it of them"
-        } else {
-            "measurement_noise = \"auto\" takes them out of the noise"
-        };
-        warnings.push(format!(
-            "neighbouring residuals show errors of the measurement in {}: {done}; where they are large give measurement_noise = <sd>, \
-             which smooths",
-            list.join(", ")
-        ));
-    }
+    warnings.extend(of_errors(choice, answer));
     let unseen: Vec<&str> =
         answer.posterior.estimates.iter().filter(|e| !e.observed).map(|e| e.name.as_str()).collect();
     if !unseen.is_empty() {

@@ -136,12 +136,7 @@ impl History {
     }
 
     fn merged(&self, pieces: std::ops::Range<usize>) -> Option<Sums> {
-        let mut pieces = self.pieces.range(pieces);
-        let mut whole = pieces.next()?.sums.clone();
-        for piece in pieces {
-            // Blocks of one kind always merge.
-            whole.merge(&piece.sums).ok()?;
-        }
-        Some(whole)
+        // Blocks of one kind always merge.
+        Sums::of(self.pieces.range(pieces).map(|piece| &piece.sums)).ok()?
     }
 }

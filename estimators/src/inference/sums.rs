@@ -173,6 +173,17 @@ impl Sums {
         Ok(())
     }
 
+    /// The sums of blocks in their order, `None` of none.
+    ///
+    /// # Errors
+    /// As for [`Sums::merge`].
+    pub fn of<'a>(blocks: impl IntoIterator<Item = &'a Self>) -> Result<Option<Self>, InferenceError> {
+        let mut blocks = blocks.into_iter();
+        let Some(mut whole) = blocks.next().cloned() else { return Ok(None) };
+        blocks.try_for_each(|block| whole.merge(block))?;
+        Ok(Some(whole))
+    }
+
     /// Forgets where these steps begin and end in time, so that nothing is joined to them.
     #[must_use]
     pub fn detach(mut self) -> Self {

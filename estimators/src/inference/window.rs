@@ -53,13 +53,8 @@ impl Window {
 
     /// The sums of all that is remembered, `None` before the first block.
     pub fn sums(&self) -> Option<Sums> {
-        let mut blocks = self.blocks.iter();
-        let mut whole = blocks.next()?.clone();
-        for block in blocks {
-            // Blocks of one kind always merge.
-            whole.merge(block).ok()?;
-        }
-        Some(whole)
+        // Blocks of one kind always merge.
+        Sums::of(&self.blocks).ok()?
     }
 
     /// Whether the blocks, which came from elsewhere, are whole and of this basis.

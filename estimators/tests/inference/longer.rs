@@ -7,7 +7,7 @@ use starlings_estimators::inference::{
     Structure,
 };
 
-use crate::kit::sde::{gauss, rng};
+use crate::kit::sde::{gauss, heun, record, rng};
 use crate::kit::{median, quantile};
 
 const H: f64 = 0.01;
@@ -38,7 +38,7 @@ fn detector(recent: usize, reference: Memory, rate: f64) -> Detector {
 }
 
 /// Every report on a recording, of which alarms are accepted.
-fn follow(mut detector: Detector, rows: &[[f64; 1]]) -> Vec<Report> {
+fn follow<const N: usize>(mut detector: Detector, rows: &[[f64; N]]) -> Vec<Report> {
     let mut reports = vec![];
     for (n, row) in rows.iter().enumerate() {
         if let Some(report) = detector.push(n as f64 * H, row).unwrap() {
@@ -72,6 +72,60 @@ fn a_change_that_no_block_shows_is_an_alarm_once_and_located() {
         );
         assert!(miss <= 16.0 && quantile(misses.clone(), 1.0) <= 64.0, "{recent}: {misses:?}");
     }
+}
+
+/// The oscillator of van der Pol, x'' = 1.5 (1 − x²) x' − k x under noise of 0.3 in both equations, whose k is 2 and after 10 000 rows 2.6.
+fn oscillator(seed: u64, n: usize) -> Vec<[f64; 2]> {
+    let mut draw = rng(seed);
+    let drift = |t: f64, [x, v]: &[f64; 2]| {
+        let k = if t < 100.0 { 2.0 } else { 2.6 };
+        [*v, 1.5 * (1.0 - x * x) * v - k * x]
+    };
+    let root = [[0.3, 0.0], [0.0, 0.3]];
+    record(n, (H, 4), [1.0, 0.0], |t, h, x| heun(&mut draw, (t, h), x, &root, &drift))
+}
+
+/// With the settings that a study has by default.
+fn watching() -> Detector {
+    let damping = Function::new(
+        "damping",
+        |_, x| (1.0 - x[0] * x[0]) * x[1],
+        |_, x, slopes| {
+            slopes[0] = -2.0 * x[0] * x[1];
+            slopes[1] = 1.0 - x[0] * x[0];
+        },
+    );
+    let coordinate =
+        |name: &str, at: usize| Function::new(name, move |_, x| x[at], move |_, _, slopes| slopes[at] = 1.0);
+    let basis = Basis::new(2, 0).with(Rule::MidPoint, damping).unwrap();
+    let basis = basis.with(Rule::MidPoint, coordinate("x", 0)).unwrap();
+    let basis = Arc::new(basis.with(Rule::MidPoint, coordinate("v", 1)).unwrap());
+    let structure = Structure::same(&basis, &["x", "v"]).unwrap();
+    let following = Following {
+        block: 100,
+        recent: 1,
+        reference: Memory::Growing,
+        least: 1000,
+        longer: true,
+        rate: 1e-6,
+        watched: vec![],
+    };
+    Detector::new(basis, H, structure, Fit::new(Diffusion::Full, 6), following).unwrap()
+}
+
+#[test]
+fn an_oscillator_that_stiffens_by_a_third_is_an_alarm_once_and_located() {
+    let (mut delays, mut misses) = (vec![], vec![]);
+    for seed in 0..20 {
+        let reports = follow(watching(), &oscillator(seed, 20_000));
+        let alarms: Vec<&Report> = reports.iter().filter(|report| report.alarm).collect();
+        assert_eq!(alarms.len(), 1, "{seed}: {alarms:?}");
+        delays.push(alarms[0].time - 100.0);
+        misses.push((alarms[0].since - 100.0).abs());
+    }
+    println!("{delays:?} after it, {misses:?} beside it");
+    assert!(delays.iter().all(|delay| (0.0..=15.0).contains(delay)), "{delays:?}");
+    assert!(quantile(misses.clone(), 1.0) <= 4.0, "{misses:?}");
 }
 
 /// One block in a hundred may have a false alarm, whatever the number of its tests.

@@ -4,6 +4,7 @@
 mod calibration;
 mod changes;
 mod coarse;
+mod constancy;
 mod damaged;
 mod decimated;
 mod draws;
