@@ -130,6 +130,10 @@ s3:
 largest-states:
     cargo test --release --test largest_states -- --ignored --nocapture
 
+# The scheme of openBF on finer and finer grids against `artery-1d`: what lies between both is openBF's grid.
+openbf-grid:
+    cargo test --release -p starlings-draft --test openbf_grid -- --include-ignored
+
 # What large states cost: 22 states of 8 MB both ways on every way, four of 256 MB in 256 MB of memory, and through a shared folder. A minute;
 # needs 5 GB in the folder for temporary files.
 states:

@@ -9,7 +9,7 @@ use starlings_coordinator::study::MAX_PASSES;
 use starlings_coordinator::study::field::{field_of, observed_fields};
 use starlings_coordinator::study::trial::{Depth, TrialChannel, dry_run};
 use starlings_coordinator::study::{Study, posterior};
-use starlings_estimators::{Form, SigmaSet};
+use starlings_estimators::{Form, SigmaSet, Slope};
 
 use crate::console::{line, number, table, text};
 use crate::disk;
@@ -78,7 +78,8 @@ fn states_text(study: &Study) -> Option<String> {
 fn ensemble(study: &Study) -> Result<(usize, bool), Failure> {
     let ensemble = match study.estimator.kind.form {
         Form::Windows(make) => make(&study.filter_options()).map(|f| (f.n_particle(), f.resamples())),
-        Form::WholeRecords => {
+        Form::WholeRecords(Slope::Exact) => Ok((1, false)),
+        Form::WholeRecords(Slope::Points) => {
             SigmaSet::new(study.estimator.points, study.theta.len()).map(|set| (set.n_particle(), false))
         }
     };
@@ -89,8 +90,9 @@ fn ensemble(study: &Study) -> Result<(usize, bool), Failure> {
 fn runs_per_pass(study: &Study, (n_particle, resamples): (usize, bool)) -> usize {
     let windows: Vec<usize> = (0..study.records.len()).map(|r| study.windows(r).len()).collect();
     if !study.estimator.kind.is_filter() {
-        // The centre is run beside the sigma points.
-        return (n_particle + 1) * windows.iter().filter(|n| **n > 0).count();
+        // The centre is run beside the sigma points, and alone where it gives the slopes.
+        let of_record = if study.estimator.kind.has_exact_slopes() { 1 } else { n_particle + 1 };
+        return of_record * windows.iter().filter(|n| **n > 0).count();
     }
     // Redrawn points are observed by runs of their own.
     let redrawn = study.estimator.resample && resamples && study.observer_is_off();

@@ -17,8 +17,6 @@ mod arteries;
 mod hearts;
 #[path = "import_command/loop_scheme.rs"]
 mod loop_scheme;
-#[path = "import_command/melis.rs"]
-mod melis;
 #[path = "import_command/signals.rs"]
 mod signals;
 
@@ -205,8 +203,9 @@ fn along(found: &Table, field: &str, [first, n, theirs]: [usize; 3], part: f64) 
     column(cell).iter().zip(column(cell + 1)).map(|(a, b)| (1.0 - rest).mul_add(*a, rest * b)).collect()
 }
 
-/// Compares, as root mean square relative to the largest value, pressure (Pa) and flow (m³/s) of a vessel with openBF's; times are taken within the period.
-fn compare_vessel(found: &Table, name: &str, period: f64, cells: [usize; 3]) {
+/// Compares, as root mean square relative to the largest value, pressure (Pa) and flow (m³/s) of a vessel with openBF's, in the period after so
+/// many. What they differ by is openBF's grid: `coordinator/draft/tests/openbf_grid.rs`.
+fn compare_vessel(found: &Table, name: &str, [period, before]: [f64; 2], cells: [usize; 3]) {
     let reference = table(&std::fs::read_to_string(file(&format!("openbf/{name}_reference.csv"))).unwrap());
     for (field, letter, unit, bound) in [("pressure", "P", 0.1, 2e-3), ("flow_rate", "Q", 1e-6, 5e-3)] {
         for (place, part) in PLACES {
@@ -215,7 +214,7 @@ fn compare_vessel(found: &Table, name: &str, period: f64, cells: [usize; 3]) {
             let wanted = &reference[&format!("{letter}_{place}")];
             let size = wanted.iter().fold(0.0, |size: f64, v| size.max(v.abs()));
             let square = reference["time"].iter().zip(wanted);
-            let square = square.map(|(t, w)| (at(&own, "v", t.rem_euclid(period)) - w).powi(2)).sum::<f64>();
+            let square = square.map(|(t, w)| (at(&own, "v", t - before * period) - w).powi(2)).sum::<f64>();
             let rms = (square / wanted.len() as f64).sqrt() / size;
             assert!(rms <= bound, "{name}: {letter} at {place} is off by {rms}");
         }
@@ -228,13 +227,13 @@ fn a_carotid_and_an_iliac_bifurcation_carry_the_waves_of_openbf() {
     let (cca, ibif) = (folder.path().join("cca"), folder.path().join("ibif"));
     import(&file("openbf/cca.yaml"), &cca);
     let found = predicted(&cca);
-    compare_vessel(&found, "cca", found["time"].last().copied().unwrap(), [0, 51, 126]);
+    compare_vessel(&found, "cca", [found["time"].last().copied().unwrap(), 3.0], [0, 51, 126]);
     import(&file("openbf/ibif.yaml"), &ibif);
     let found = predicted(&ibif);
     let period = found["time"].last().copied().unwrap();
     for (name, cells) in [("ibif_parent", [0, 35, 86]), ("ibif_d1", [35, 34, 85]), ("ibif_d2", [69, 34, 85])]
     {
-        compare_vessel(&found, name, period, cells);
+        compare_vessel(&found, name, [period, 8.0], cells);
     }
 }
 

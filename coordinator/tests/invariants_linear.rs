@@ -62,7 +62,9 @@ fn missing_values_are_left_out_and_the_length_of_a_window_does_not_matter() {
     }
     let answer = Regression::of_record(&times, &z).solve();
     for every in [1, 5, 40, 1000] {
-        for estimator in ["passes = 1", "passes = 2", "points = \"star\"", "kind = \"batch\""] {
+        for estimator in
+            ["passes = 1", "passes = 2", "points = \"star\"", "kind = \"batch\"", "kind = \"gauss-newton\""]
+        {
             let record = linear::record("one", "line.csv", linear::NOISE, &format!("every = {every}"));
             let done =
                 run_once(&linear::study_of(estimator, &record), &[("line.csv", linear::file(&times, &z))]);
@@ -86,7 +88,9 @@ fn channels_sampled_at_different_times_count_each_with_its_own_noise() {
     problem.z.rows_mut(m, n).copy_from(&other.z);
     problem.noise = problem.noise.resize_vertically(m + n, 0.4);
     let answer = problem.solve();
-    for estimator in ["passes = 1", "passes = 2", "points = \"star\"", "kind = \"batch\""] {
+    for estimator in
+        ["passes = 1", "passes = 2", "points = \"star\"", "kind = \"batch\"", "kind = \"gauss-newton\""]
+    {
         for every in [1, 5] {
             let study = linear::study_of(
                 estimator,

@@ -78,6 +78,7 @@ fn a_joint_fit_is_the_regression_of_the_stacked_records() {
         ("points = \"star\"\npasses = 2", ["", "", ""]),
         ("points = \"star\"\npasses = 1", ["every = 5", "", "every = 2"]),
         ("kind = \"batch\"", ["", "", ""]),
+        ("kind = \"gauss-newton\"", ["", "", ""]),
     ] {
         let done = joint(estimator, every);
         let names: Vec<&str> = done.summary.parameters.iter().map(|p| p.name.as_str()).collect();
@@ -92,7 +93,7 @@ fn a_joint_fit_is_the_regression_of_the_stacked_records() {
 
 #[test]
 fn a_held_out_record_is_predicted_with_the_mean_of_the_others_and_its_own_prior_start() {
-    for estimator in ["passes = 2", "kind = \"batch\""] {
+    for estimator in ["passes = 2", "kind = \"batch\"", "kind = \"gauss-newton\""] {
         let done = joint(estimator, ["", "use = \"held-out\"", ""]);
         assert_exact(&done, &stacked(&[0, 2]), 1e-6, estimator);
         let estimate = |name: &str| done.estimate(name).estimate;

@@ -12,11 +12,15 @@ use nalgebra::{DMatrix, DVector};
 use crate::blocks::{self, Block};
 use crate::data::same;
 use crate::linearisation::{Ensemble, Linearisation, Outcome};
-use crate::{Data, EstimatorError, Form, Gaussian, Kind, SigmaSet};
+use crate::{Data, EstimatorError, Form, Gaussian, Kind, SigmaSet, Slope};
 
 /// Iterated sigma-point Gauss-Newton.
-pub static BATCH: Kind =
-    Kind { name: "batch", keys: &["max_iterations", "tolerance"], spread: 0.1, form: Form::WholeRecords };
+pub static BATCH: Kind = Kind {
+    name: "batch",
+    keys: &["max_iterations", "tolerance"],
+    spread: 0.1,
+    form: Form::WholeRecords(Slope::Points),
+};
 
 /// Damping of the first step, relative to the diagonal of the information.
 const FIRST_DAMPING: f64 = 1e-3;

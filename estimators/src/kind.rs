@@ -25,7 +25,16 @@ pub enum Form {
     /// From window to window, on particles that go on from the states of the last analysis.
     Windows(MakeFilter),
     /// Over whole records, each run from its start.
-    WholeRecords,
+    WholeRecords(Slope),
+}
+
+/// How a fit of whole records knows the slope of the predictions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Slope {
+    /// From sigma points around the centre, a run each.
+    Points,
+    /// From the model's own derivatives, which one run at the centre gives.
+    Exact,
 }
 
 /// Makes a filter.
@@ -50,6 +59,11 @@ impl Kind {
     /// Whether it goes from window to window, on states that the model restarts from.
     pub fn is_filter(&self) -> bool {
         matches!(self.form, Form::Windows(_))
+    }
+
+    /// Whether its runs give the derivatives of what they predict.
+    pub fn has_exact_slopes(&self) -> bool {
+        matches!(self.form, Form::WholeRecords(Slope::Exact))
     }
 }
 

@@ -22,6 +22,7 @@ mod error;
 mod exchange;
 mod filter;
 pub mod forecast;
+mod gauss_newton;
 mod gaussian;
 mod gram;
 mod identifiability;
@@ -61,11 +62,12 @@ pub use drift::Drift;
 pub use error::EstimatorError;
 pub use exchange::{Exchanged, exchange_prior};
 pub use filter::{Filter, Resampled};
+pub use gauss_newton::GAUSS_NEWTON;
 pub use gaussian::Gaussian;
 pub use identifiability::{
     Collinearity, Direction, Fisher, Sensitivities, Subset, sigma_point_sensitivities, weak_directions,
 };
-pub use kind::{Form, Kind, MakeFilter, Options};
+pub use kind::{Form, Kind, MakeFilter, Options, Slope};
 pub use least_squares::{End, LeastSquares, Need, Scaled};
 pub use linearisation::Linearisation;
 pub use particles::Particles;
@@ -80,4 +82,4 @@ pub use transform::Transform;
 pub use whiteness::ljung_box;
 
 /// All estimators, the default first.
-pub const KINDS: &[&Kind] = &[&ROUKF, &BATCH];
+pub const KINDS: &[&Kind] = &[&ROUKF, &BATCH, &GAUSS_NEWTON];

@@ -12,7 +12,7 @@ fn filters(n_param: usize) -> Vec<(&'static Kind, Box<dyn Filter>)> {
     let options = Options { n_param, points: Points::Simplex, root: Root::Symmetric, drift: vec![], seed: 7 };
     let made = KINDS.iter().filter_map(|kind| match &kind.form {
         Form::Windows(make) => Some((*kind, make(&options).unwrap())),
-        Form::WholeRecords => None,
+        Form::WholeRecords(_) => None,
     });
     made.collect()
 }

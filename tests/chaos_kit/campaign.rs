@@ -204,16 +204,19 @@ impl Campaign {
         }
     }
 
-    /// Starts the coordinator again and waits until it listens.
+    /// Starts the coordinator again, from what its folder holds where there is a run in it, and waits until it listens.
     pub(crate) fn resume(&mut self) -> Result<(), String> {
         let pid = self.coordinator.child.id();
         self.pending.retain(|pending| !matches!(pending.undo, Undo::Continue(of) if of == pid));
-        let acknowledged = judge::acknowledged(&self.place.out())
-            .map_err(|error| format!("the store is damaged: {error}"))?;
-        self.acknowledged.extend(acknowledged);
+        let is_begun = self.place.out().join("run.db").exists();
+        if is_begun {
+            let acknowledged = judge::acknowledged(&self.place.out());
+            self.acknowledged.extend(acknowledged.map_err(|error| format!("the store is damaged: {error}"))?);
+        }
+        let resume: &[&str] = if is_begun { &["--resume"] } else { &[] };
         self.said = format!("{}{}-- resumed --\n", self.said, self.coordinator.said());
         self.scratch_was_full = self.pending.iter().any(|pending| matches!(pending.undo, Undo::Clear));
-        self.coordinator = coordinator(self.sort, &self.place, self.address, &["--resume"]);
+        self.coordinator = coordinator(self.sort, &self.place, self.address, resume);
         while !self.over && !self.coordinator.said().contains(LISTENS) {
             self.wait()?;
         }

@@ -18,8 +18,9 @@ const SEEN: Duration = Duration::from_secs(90);
 /// Words of which an error of a full disk has at least one.
 const FULL: [&str; 3] = ["disk is full", "disk failed or is full", "No space left"];
 
-/// What an error says to do when the disk has room again: go on, or write the files of a run that is done.
-const THEN: [&str; 2] = ["--resume", "`starlings report`"];
+/// What an error says to do when the disk has room again: go on, write the files of a run that is done, or begin it.
+const THEN: [&str; 3] =
+    ["--resume", "`starlings report`", "nothing was begun: see that it has space and start again"];
 
 impl Campaign {
     /// Lets a fault happen.

@@ -2,8 +2,8 @@
 //!
 //! A unit of one kind of work takes as long as units of it took so far; of a kind of which nothing is done yet as long as it should beside
 //! the others ([`Takes`]). That is what the rest takes at the mean speed so far; it is multiplied by how much slower work was in the later
-//! half of the time than over all of it, so that workers that come or go show, and one slow run does not. Next file to read:
-//! [`super::view`].
+//! half of the time than over all of it, so that workers that come or go show, and one slow run does not: the fewer looks tell a change the
+//! less of it is believed. Next file to read: [`super::view`].
 
 use std::collections::VecDeque;
 
@@ -11,6 +11,8 @@ use starlings_study::{Part, Takes, Work};
 
 /// Looks that are kept.
 const KEPT: usize = 256;
+/// Looks after which half of a change of speed is believed: what single runs take differs by about as much as speeds do.
+const BELIEVED: f64 = 1.0;
 
 /// Work against time.
 #[derive(Clone, Debug, Default)]
@@ -116,7 +118,9 @@ impl Pace {
         let passed = last.at_s - before.at_s;
         let left: Vec<f64> = work.parts.iter().map(|part| part.left).collect();
         let rest = of_all(rates, &left)?;
-        let foreseen = rest * passed / made - (now_s - last.at_s);
+        let looks = (self.looks.len() - 1 - from) as f64;
+        let slower = 1.0 + (passed / made - 1.0) * looks / (looks + BELIEVED);
+        let foreseen = rest * slower - (now_s - last.at_s);
         // As if as much were done just now as between two looks before.
         let steps = self.looks.iter().skip(from).zip(self.looks.iter().skip(from + 1));
         let step = steps.filter_map(|(a, b)| took(a, b)).fold(0.0, f64::max).min(rest);

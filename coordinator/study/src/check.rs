@@ -22,6 +22,7 @@ mod records;
 pub(crate) mod relative;
 pub(crate) mod scales;
 mod settings;
+mod slopes;
 mod solver;
 mod spectrum;
 mod survey;
@@ -210,6 +211,7 @@ fn checked(
     let described = (model.setup, model.spec);
     let (observers, processes, predicted) =
         (file.observer.clone(), walks::places(&file), file.predict.span.clone());
+    let kind = file.estimator.kind.as_ref().map(toml::Spanned::span);
     let study = Study {
         candidates: Arc::new(model.candidates),
         parameters,
@@ -224,6 +226,7 @@ fn checked(
         candidate_warnings,
         ..study_of(path, source, file, described, (fleet, estimator), solver_host)
     };
+    slopes::check(source, kind, &study);
     walks::check(source, &processes, predicted, &study);
     nudged::check(source, &observers, &study);
     together::check(source, &observers, &study);

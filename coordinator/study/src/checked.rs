@@ -215,6 +215,9 @@ impl Study {
 
     /// The same with the number of passes that were made.
     pub(crate) fn describe_with(&self, passes: Option<usize>) -> String {
+        if self.estimator.kind.has_exact_slopes() {
+            return format!("{}, exact slopes", self.estimator.kind.name);
+        }
         let points = match self.estimator.points {
             Points::Simplex => "simplex",
             Points::Canonical => "canonical",

@@ -52,19 +52,37 @@ impl Study {
     /// an initial value its own prior median.
     pub fn theta_for(&self, record: usize, transformed: &[f64]) -> Vec<f64> {
         let value = |(index, parameter): (usize, &StudyParameter)| {
-            let mut sum = 0.0;
-            let mut count = 0_u32;
-            for (entry, value) in self.theta.iter().zip(transformed).filter(|(e, _)| e.parameter == index) {
-                if entry.record.is_none_or(|r| r == record) {
-                    return parameter.transform.to_physical(*value);
-                }
-                sum += value;
-                count += 1;
-            }
+            let entries = self.entries_for(record, index);
+            let sum: f64 = entries.iter().map(|entry| transformed[*entry]).sum();
             let mean =
-                if parameter.is_initial() { parameter.prior_mean[record] } else { sum / f64::from(count) };
+                if entries.is_empty() { parameter.prior_mean[record] } else { sum / entries.len() as f64 };
             parameter.transform.to_physical(mean)
         };
         self.parameters.iter().enumerate().map(value).collect()
+    }
+
+    /// How the values of [`Study::theta_for`] move with the estimated vector: value, entry and derivative, where there is one.
+    pub(crate) fn theta_slopes(&self, record: usize, transformed: &[f64]) -> Vec<(usize, usize, f64)> {
+        let mut slopes = Vec::new();
+        for (index, parameter) in self.parameters.iter().enumerate() {
+            let entries = self.entries_for(record, index);
+            let share = 1.0 / entries.len() as f64;
+            let mean: f64 = entries.iter().map(|entry| transformed[*entry]).sum::<f64>() * share;
+            let slope = share * parameter.transform.derivative(mean);
+            slopes.extend(entries.into_iter().map(|entry| (index, entry, slope)));
+        }
+        slopes
+    }
+
+    /// The entries of the estimated vector of which a parameter's value for this record is the mean: its own, all of them where it has
+    /// none, or none where it takes the prior median.
+    fn entries_for(&self, record: usize, parameter: usize) -> Vec<usize> {
+        let of_parameter = self.theta.iter().enumerate().filter(|(_, e)| e.parameter == parameter);
+        let own = of_parameter.clone().find(|(_, e)| e.record.is_none_or(|own| own == record));
+        match own {
+            Some((entry, _)) => vec![entry],
+            None if self.parameters[parameter].is_initial() => Vec::new(),
+            None => of_parameter.map(|(entry, _)| entry).collect(),
+        }
     }
 }

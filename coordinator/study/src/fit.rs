@@ -19,6 +19,7 @@ pub(crate) mod results;
 pub(crate) mod runner;
 mod schedule;
 pub(crate) mod settle;
+mod slopes;
 pub(crate) mod stack;
 mod timeouts;
 mod walking;

@@ -5,7 +5,7 @@
 
 use std::sync::Arc;
 
-use starlings_models::{Signal, Window};
+use starlings_models::{Setup, Signal, Window};
 
 use super::checked::{Record, Study};
 use crate::fit::runner::StepWindows;
@@ -52,6 +52,11 @@ impl Study {
     pub(crate) fn trained_windows(&self) -> StepWindows {
         let trained = (0..self.records.len()).filter(|record| self.records[*record].is_trained());
         trained.map(|record| (record, Arc::new(self.whole(record, true)))).collect()
+    }
+
+    /// The setup whose runs predict the derivatives by every value beside the outputs.
+    pub(crate) fn with_slopes(&self) -> Setup {
+        Setup { slopes: true, ..self.setup.clone() }
     }
 
     /// The window that is asked for where this one is wanted from the record's start: all times of the record where the solver

@@ -27,7 +27,7 @@ impl Study {
                 let longest = (0..records).map(|record| self.windows(record).len()).max().unwrap_or(0);
                 (longest, self.estimator.passes.unwrap_or(PASSES))
             }
-            Form::WholeRecords => (1, self.estimator.max_iterations),
+            Form::WholeRecords(_) => (1, self.estimator.max_iterations),
         };
         let [job, estimate, innovation] = ROWS;
         let of_analysis = (particles * records) as u64 * job + p as u64 * estimate;

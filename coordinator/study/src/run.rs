@@ -187,7 +187,7 @@ fn from_start_to_end(
     runner.threads = context.threads.max(1);
     let fit = match study.estimator.kind.form {
         Form::Windows(make) => filter::fit(make, &mut runner, &folder.store, context, resumed)?,
-        Form::WholeRecords => batch::fit(&mut runner, &folder.store, context, resumed)?,
+        Form::WholeRecords(_) => batch::fit(&mut runner, &folder.store, context, resumed)?,
     };
     let AfterFit { predictions, predicted, observer, hangs_on, beside } =
         after_fit(&mut runner, &folder.store, &fit, context)?;

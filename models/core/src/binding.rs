@@ -11,7 +11,7 @@ const INITIAL: &str = "initial:";
 
 /// Where one value goes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Target {
+pub(crate) enum Target {
     /// A parameter of the model.
     Parameter(usize),
     /// A state's initial value.
@@ -79,6 +79,25 @@ impl Binding {
     /// The model's parameters: constants and defaults, zero for what a job gives.
     pub(crate) fn constants(&self) -> &[f64] {
         &self.theta
+    }
+
+    /// Names of the values in a job.
+    pub(crate) fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// Where each value of a job goes.
+    pub(crate) fn targets(&self) -> &[Target] {
+        &self.targets
+    }
+
+    /// States whose initial value a constant or a job gives.
+    pub(crate) fn given(&self) -> impl Iterator<Item = usize> {
+        let of_job = self.targets.iter().filter_map(|target| match *target {
+            Target::Initial(i) => Some(i),
+            Target::Parameter(_) => None,
+        });
+        self.initial.iter().map(|(i, _)| *i).chain(of_job)
     }
 
     /// Number of values in a job.

@@ -9,6 +9,7 @@ use crate::blocks::Sections;
 use crate::integrate::Solver;
 use crate::memory::Memory;
 use crate::segment::{Drive, Segment};
+use crate::slopes::Slopes;
 use crate::{Blocks, ModelFailure, Spec};
 
 pub use on_segment::advance_by;
@@ -68,6 +69,14 @@ pub trait Model: Send + Sync {
     ) -> bool {
         let _ = (t, x, theta, u, dfdx, dfdt);
         false
+    }
+
+    /// The equations with their derivatives.
+    ///
+    /// # Errors
+    /// Why the model has none, as the end of a sentence that names it.
+    fn slopes(&self) -> Result<&dyn Slopes, String> {
+        Err("it is built in, and only models of equations give their derivatives".to_owned())
     }
 
     /// The blocks of a linear fluid–structure system at these parameters; `None` for a model that is none. Whether there are

@@ -109,6 +109,9 @@ pub struct Setup {
     /// the initial state.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub periods: Vec<f64>,
+    /// Whether every run predicts, after the outputs at a time, their derivatives by each of the parameters in turn: as many rows for each.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub slopes: bool,
     /// What jobs of a dynamical inference sum over their rows, instead of running the model.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sums: Option<Box<SumsDef>>,

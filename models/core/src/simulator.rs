@@ -14,6 +14,7 @@ use crate::noise::WhiteNoise;
 use crate::observer::{self, Correction, Observer, Wiring};
 use crate::past::Past;
 use crate::segment::Segment;
+use crate::sensitivity::Sensitive;
 use crate::setup::Setup;
 use crate::spans::Spans;
 use crate::{
@@ -28,6 +29,8 @@ pub struct Simulator {
     spec: Spec,
     observer: Box<dyn Observer>,
     binding: Binding,
+    /// Number of states that a run hands on: the model's own, without their derivatives.
+    n_state: usize,
     /// What stands in each predicted row.
     rows: Vec<Row>,
     /// Seed of the model's noise; `None` leaves it out.
@@ -60,9 +63,39 @@ impl Simulator {
         let (outputs, theta) = (&setup.outputs, binding.constants());
         let wiring = Wiring { spec: &spec, outputs, model: &*model, theta, native };
         let observer = observer::build(&setup.observer, wiring)?;
+        if setup.slopes {
+            return Self::sensitive(model, setup, observer, binding, &rows);
+        }
         let max_steps = setup.max_steps.unwrap_or(MAX_STEPS);
         let timeout = setup.timeout.unwrap_or(TIMEOUT);
-        Ok(Self { model, spec, observer, binding, rows, noise: setup.noise, max_steps, timeout })
+        let n_state = spec.n_state();
+        Ok(Self { model, spec, observer, binding, n_state, rows, noise: setup.noise, max_steps, timeout })
+    }
+
+    /// The same for a model with its derivatives: below the given rows, theirs by each value of a job.
+    fn sensitive(
+        model: Box<dyn Model>,
+        setup: &Setup,
+        observer: Box<dyn Observer>,
+        binding: Binding,
+        rows: &[Row],
+    ) -> Result<Self, SetupError> {
+        if !setup.observer.is_off() || !setup.periods.is_empty() {
+            let what = if setup.periods.is_empty() { "under an observer" } else { "from a periodic start" };
+            return Err(SetupError::Invalid(format!("derivatives of a run {what} are not to be had")));
+        }
+        let (n_state, n_output) = (model.spec().n_state(), model.spec().n_output());
+        let below = |by: usize| {
+            rows.iter().map(move |row| match *row {
+                Row::Output(i) => Row::Output(by * n_output + i),
+                Row::State(i) => Row::State(by * n_state + i),
+            })
+        };
+        let rows = (0..=binding.len()).flat_map(below).collect();
+        let model: Box<dyn Model> = Box::new(Sensitive::new(model, &binding)?);
+        let (max_steps, timeout) = (setup.max_steps.unwrap_or(MAX_STEPS), setup.timeout.unwrap_or(TIMEOUT));
+        let spec = model.spec().clone();
+        Ok(Self { model, spec, observer, binding, n_state, rows, noise: None, max_steps, timeout })
     }
 
     /// The model's state at the window's start, and the past that led to it.
@@ -176,6 +209,7 @@ impl Simulator {
         past.store(previous, &mut x);
         // An observer moves the state after the last check.
         self.check_finite(previous, &[], &x, &[])?;
+        x.truncate(self.n_state);
         Ok(Prediction { outputs, state: x, cost: 0.0 })
     }
 

@@ -76,6 +76,7 @@ impl Served {
             noise: None,
             sums: None,
             periods: Vec::new(),
+            slopes: false,
         };
         let theta =
             request.parameters.into_iter().chain(request.initial.iter().map(|(_, value)| *value)).collect();

@@ -73,6 +73,13 @@ pub(crate) fn estimator(
         );
         source.report_with(given.span(), message, "use kind = \"batch\", which runs whole records");
     }
+    if let (Some(solver), Some(given), true) = (solver, &section.kind, kind.has_exact_slopes()) {
+        let message = format!(
+            "kind = \"{}\" wants derivatives, and the solver `{}` gives none",
+            kind.name, solver.name
+        );
+        source.report_with(given.span(), message, "use kind = \"batch\", whose sigma points stand for them");
+    }
     let roots = [("symmetric", Root::Symmetric), ("cholesky", Root::Cholesky)];
     let resample = [("svd", true), ("none", false)];
     foreign_keys(source, section, kind, once);
@@ -193,6 +200,17 @@ fn foreign_keys(source: &Source, section: &EstimatorSection, kind: &Kind, once: 
         ("max_iterations", section.max_iterations.as_ref().map(Spanned::span)),
         ("tolerance", section.tolerance.as_ref().map(Spanned::span)),
     ];
+    let of_points = [
+        ("points", section.points.as_ref().map(Spanned::span)),
+        ("kappa", section.kappa.as_ref().map(Spanned::span)),
+        ("spread", section.spread.as_ref().map(Spanned::span)),
+    ];
+    for (key, span) in of_points.into_iter().filter(|_| kind.has_exact_slopes()) {
+        if let Some(span) = span {
+            let message = format!("`{key}` is of sigma points, and kind = \"{}\" has none", kind.name);
+            source.report_with(span, message, "remove it, or use kind = \"batch\"");
+        }
+    }
     for (key, span) in given {
         let owner = KINDS.iter().find(|other| other.keys.contains(&key));
         if let (Some(span), Some(owner), false) = (span, owner, kind.keys.contains(&key)) {

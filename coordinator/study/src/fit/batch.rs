@@ -1,4 +1,4 @@
-//! The batch fit: iterated sigma-point Gauss–Newton over whole-record runs, one iteration = one ensemble.
+//! The batch fit: iterated Gauss–Newton over whole-record runs, one iteration = one ensemble, or one run that gives its slopes.
 //!
 //! For solvers that cannot restart from a state, and as a reference for the filter: every run starts at its record's start,
 //! so no linear mixture of states is ever used. Next file to read: the `batch` module of `starlings-estimators`.
@@ -11,6 +11,7 @@ use starlings_models::Window;
 
 use super::ensemble::noise;
 use super::runner::{AnalysisIndex, EnsembleRunner, Results, StepWindows};
+use super::slopes;
 use super::stack::stack_outputs;
 use crate::store::snapshot::{Figures, Iteration, Snapshot};
 use crate::store::{AnalysisRow, Store};
@@ -41,7 +42,8 @@ pub(crate) fn fit(
     };
     let values: Vec<f64> = windows.iter().flat_map(|(_, w)| w.observed.iter().copied()).collect();
     let noise = noise(study, &windows, 1.0);
-    let plan = WorkPlan::new(study, batch.set.n_particle() + 1);
+    let exact = study.estimator.kind.has_exact_slopes();
+    let plan = WorkPlan::new(study, if exact { 1 } else { batch.set.n_particle() + 1 });
     let mut settling = Settling::default();
     let mut now = match resumed {
         Some(snapshot) => {
@@ -55,10 +57,15 @@ pub(crate) fn fit(
     }
     while !now.estimate.state.converged && now.figures.step < batch.max_iterations {
         let at = AnalysisIndex { pass: 1, step: now.figures.step };
-        let theta = batch.sample(&now.estimate.state);
+        let points = batch.sample(&now.estimate.state);
+        let theta = if exact { points.columns(0, 1).into_owned() } else { points };
         store.keep_points(at.step, &theta)?;
         let results = run_ensemble(runner, &mut now, at, &theta, &windows)?;
-        let (predictions, failed) = gathered(&batch, &results, &windows);
+        let (predictions, failed) = if exact {
+            slopes::as_points(study, &batch, &now.estimate.state, &results[0], &windows)
+        } else {
+            gathered(&batch, &results, &windows)
+        };
         let (next, step) = batch.step(
             &now.estimate.state,
             &predictions,

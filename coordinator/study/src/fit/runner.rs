@@ -114,9 +114,12 @@ impl<'a> EnsembleRunner<'a> {
         states: &[Option<States>],
         windows: &StepWindows,
     ) -> Result<Results, RunError> {
+        let slopes = self.wants_slopes(at);
+        let wide = |window: Arc<Window>| if slopes { self.widened(&window) } else { window };
         let sent: StepWindows =
-            windows.iter().map(|(record, window)| (*record, self.sent(*record, window))).collect();
-        let (study, setup) = (self.study, self.setup);
+            windows.iter().map(|(record, window)| (*record, wide(self.sent(*record, window)))).collect();
+        let study = self.study;
+        let setup = if slopes { self.fleet.install(&study.with_slopes())? } else { self.setup };
         let job = |index: usize| {
             let (particle, (record, window)) = (particles[index / sent.len()], &sent[index % sent.len()]);
             let column: DVector<f64> = theta.column(particle).into_owned();
@@ -172,7 +175,7 @@ impl<'a> EnsembleRunner<'a> {
                     // Of what the solver gave, the outputs that the study asked for.
                     let given = std::mem::take(&mut prediction.outputs);
                     prediction.outputs = self.study.picked(*record, window, given);
-                    self.check(prediction, *record, column, theta, window)?;
+                    self.check(at, prediction, *record, column, theta, window)?;
                     self.study.measure(*record, &window.times, &mut prediction.outputs);
                 }
                 of_particle.push(result);
@@ -202,6 +205,17 @@ impl<'a> EnsembleRunner<'a> {
         self.failures.learn(values, failure.as_deref());
     }
 
+    /// Whether the runs for this analysis predict derivatives beside the outputs.
+    fn wants_slopes(&self, at: AnalysisIndex) -> bool {
+        at.is_of_fit() && self.study.estimator.kind.has_exact_slopes()
+    }
+
+    /// The window with room for the outputs and their derivatives by every value of a job.
+    fn widened(&self, window: &Window) -> Arc<Window> {
+        let n = window.observed.len() * (1 + self.study.parameters.len());
+        Arc::new(Window { observed: vec![f64::NAN; n], ..window.clone() })
+    }
+
     /// The window that a job carries: what the solver answers for, with what an observer knows.
     fn sent(&self, record: usize, window: &Arc<Window>) -> Arc<Window> {
         self.study.sendable(record, &self.study.asked(record, window))
@@ -224,6 +238,7 @@ impl<'a> EnsembleRunner<'a> {
     /// A prediction of another length is an error of the run, not a failure of the particle.
     fn check(
         &self,
+        at: AnalysisIndex,
         prediction: &Prediction<Held>,
         record: usize,
         particle: usize,
@@ -231,8 +246,10 @@ impl<'a> EnsembleRunner<'a> {
         window: &Window,
     ) -> Result<(), RunError> {
         let (outputs, state) = (prediction.outputs.len(), prediction.state.n_state());
-        let reason = if outputs != window.observed.len() {
-            format!("{outputs} predicted values where {} were asked for", window.observed.len())
+        let with_slopes = if self.wants_slopes(at) { 1 + self.study.parameters.len() } else { 1 };
+        let wanted = window.observed.len() * with_slopes;
+        let reason = if outputs != wanted {
+            format!("{outputs} predicted values where {wanted} were asked for")
         } else if let Some(wanted) = self.n_state.filter(|n| *n != state) {
             format!("a state of {state} values where {wanted} belong")
         } else {

@@ -1,6 +1,6 @@
 //! Why a store refuses, with the remedy.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use starlings_fleet::StateError;
 
@@ -8,7 +8,7 @@ use starlings_fleet::StateError;
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
     /// The database refused; the text names the file and the remedy.
-    #[error("cannot use {path}: {source}{}", remedy(source))]
+    #[error("cannot use {path}: {source}{}", remedy(path, source))]
     Database {
         /// The database file.
         path: PathBuf,
@@ -53,8 +53,12 @@ impl StoreError {
     }
 }
 
-fn remedy(source: &rusqlite::Error) -> &'static str {
+fn remedy(path: &Path, source: &rusqlite::Error) -> &'static str {
     match source.sqlite_error_code() {
+        // What cannot be made whole is removed.
+        Some(rusqlite::ErrorCode::DiskFull | rusqlite::ErrorCode::SystemIoFailure) if !path.exists() => {
+            "; the disk failed or is full, and nothing was begun: see that it has space and start again"
+        }
         Some(rusqlite::ErrorCode::DiskFull) => {
             "; the disk is full: free some space and continue with --resume, all but its last moment is kept"
         }

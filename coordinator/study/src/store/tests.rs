@@ -86,6 +86,13 @@ fn a_full_disk_is_told_with_its_remedy_and_keeps_every_committed_analysis() {
     store.analysis(&row(step), &snapshot(step + 1)).expect("with room again it goes on");
 }
 
+#[test]
+fn a_disk_that_is_full_before_there_is_a_run_is_not_to_be_resumed() {
+    let full = rusqlite::Error::SqliteFailure(rusqlite::ffi::Error::new(rusqlite::ffi::SQLITE_FULL), None);
+    let error = StoreError::Database { path: "absent/run.db".into(), source: full }.to_string();
+    assert!(error.contains("start again") && !error.contains("--resume"), "{error}");
+}
+
 /// An empty store in a folder of its own.
 fn empty() -> (tempfile::TempDir, Store) {
     let folder = tempfile::tempdir().unwrap();

@@ -54,7 +54,7 @@ pub(super) fn dry_run_by(
         let of_record = DryRun::new(study, model, record);
         let told = match kind.form {
             Form::Windows(_) => of_record.windows(depth).map(|()| None)?,
-            Form::WholeRecords => of_record.training_span()?,
+            Form::WholeRecords(_) => of_record.training_span()?,
         };
         if let Some(why) = told.filter(|_| !study.whole_answers) {
             study.whole_answers = true;

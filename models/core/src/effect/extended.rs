@@ -21,6 +21,7 @@ use crate::equations::Slot;
 use crate::integrate::Solver;
 use crate::scratch::Scratch;
 use crate::segment::{Drive, Segment};
+use crate::slopes::Slopes;
 use crate::{Blocks, Memory, Model, ModelFailure, Spec, advance_by};
 
 /// A model and the effects added to it.
@@ -145,6 +146,10 @@ impl Extended {
 }
 
 impl Model for Extended {
+    fn slopes(&self) -> Result<&dyn Slopes, String> {
+        Err("it has effects, whose derivatives are not known".to_owned())
+    }
+
     fn spec(&self) -> &Spec {
         &self.spec
     }

@@ -4,6 +4,8 @@
 
 use crate::segment::Drive;
 
+pub use crate::slopes::Direction;
+
 /// Where a name's value is found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Slot {
@@ -31,20 +33,5 @@ pub struct At<'a> {
     /// Inputs.
     pub u: Drive<'a>,
     /// Outputs; may be empty when no name was resolved to one.
-    pub y: &'a [f64],
-}
-
-/// A direction of differentiation: one component per component of [`At`]; a slice that is too short counts as zero.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Direction<'a> {
-    /// Along time.
-    pub t: f64,
-    /// Along the states.
-    pub x: &'a [f64],
-    /// Along the parameters.
-    pub theta: &'a [f64],
-    /// Along the inputs.
-    pub u: &'a [f64],
-    /// Along the outputs.
     pub y: &'a [f64],
 }

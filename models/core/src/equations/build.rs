@@ -35,6 +35,8 @@ pub(super) struct Built {
     /// For each memory, the state or output that it remembers.
     pub(super) sources: Vec<Slot>,
     pub(super) solver: Solver,
+    /// Why the derivatives by the parameters that no constant fixes are not to be had, if so.
+    pub(super) not_smooth: Option<String>,
 }
 
 /// Checks and compiles the equations.
@@ -90,6 +92,19 @@ pub(super) fn build(def: &EquationsDef, constants: &BTreeMap<String, f64>) -> Re
     let switches = switches(&rates, &names, &resolve)?;
     let spec = spec(def, &names, &parameters, &values);
     let memories = memories.take();
+    let placed = |at: String, e: &Expression| e.jumps(&|name| moves(&names, constants, name)).then_some(at);
+    let jump = rates.iter().zip(&names.states).find_map(|((e, _), (name, _))| placed(place(name), e));
+    let jump = jump.or_else(|| {
+        let outputs = values.iter().zip(&def.outputs);
+        outputs.into_iter().find_map(|((e, _), output)| placed(format!("output `{}`", output.name), e))
+    });
+    let not_smooth = match (jump, memories.first()) {
+        (Some(place), _) => Some(format!(
+            "its {place} jumps, by `sign`, `step`, `if` or a comparison of what parameters move"
+        )),
+        (None, Some(memory)) => Some(format!("it reads the past of `{}`", memory.of)),
+        (None, None) => None,
+    };
     Ok(Built {
         spec,
         initial: Programs::new(&initial),
@@ -101,6 +116,7 @@ pub(super) fn build(def: &EquationsDef, constants: &BTreeMap<String, f64>) -> Re
         sources: memories.iter().map(|memory| source(&memory.of, def, &names)).collect(),
         memories,
         solver,
+        not_smooth,
     })
 }
 
@@ -137,6 +153,11 @@ fn switches(
         e.compile(resolve, &|_| None).map_err(|error| fault("switching function".to_owned(), e.text(), error))
     };
     list.iter().map(compile).collect()
+}
+
+/// Whether a value changes with parameters that are estimated: states and outputs do, inputs and constants do not.
+fn moves(names: &Names<'_>, constants: &BTreeMap<String, f64>, name: &str) -> bool {
+    names.input(name).is_none() && !constants.contains_key(name)
 }
 
 fn spec(

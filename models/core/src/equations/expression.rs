@@ -4,8 +4,8 @@
 
 use super::at::Slot;
 use super::expression_error::ExpressionError;
-use super::node::{Node, Operation};
-use super::{calculus, compile, linear, node, parse};
+use super::node::{Function, Node, Operation};
+use super::{calculus, compile, linear, parse};
 
 use super::program::Program;
 
@@ -91,6 +91,21 @@ impl Expression {
         list
     }
 
+    /// Whether the value may jump where something moves: where a sign, a step, a comparison or a condition looks at one of the names.
+    pub(super) fn jumps(&self, moves: &dyn Fn(&str) -> bool) -> bool {
+        let mut found = false;
+        self.node.walk(&mut |part| {
+            let has_kink_only = matches!(
+                part,
+                Node::Call(Function::Abs, _) | Node::Pair(Operation::Min | Operation::Max, ..)
+            );
+            if let Some(g) = switching(part).filter(|_| !has_kink_only) {
+                g.walk(&mut |n| found |= n.name().is_some_and(|name| moves(&name.text)));
+            }
+        });
+        found
+    }
+
     pub(super) fn node(&self) -> &Node {
         &self.node
     }
@@ -107,7 +122,7 @@ impl Expression {
 
 /// The switching function of this part alone, unless it never changes.
 fn switching(part: &Node) -> Option<Node> {
-    use node::Function::{Abs, Sign, Step};
+    use Function::{Abs, Sign, Step};
     let g = match part {
         Node::Call(Sign | Step | Abs, a) => (**a).clone(),
         Node::Pair(operation, a, b)

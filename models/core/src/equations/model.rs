@@ -7,8 +7,10 @@ use std::collections::BTreeMap;
 use super::at::{At, Direction, Slot};
 use super::build::{self, Built};
 use super::def::EquationsDef;
+use super::program::Programs;
 use crate::integrate::Solver;
 use crate::segment::Drive;
+use crate::slopes::{LANES, Slopes, Take};
 use crate::{Memory, Model, SetupError, Spec};
 
 /// A model whose equations a study states.
@@ -125,17 +127,75 @@ impl Model for EquationsModel {
         let n = self.unit.len();
         let at = At { t, x, theta, u, y: &[] };
         dfdx.fill(0.0);
-        for (j, column) in dfdx.chunks_exact_mut(n).enumerate() {
-            let along = Direction { x: &self.unit[n - 1 - j..], ..Direction::default() };
-            self.built.rates.each_slope(&at, &along, |i, slope| {
-                // A rate without the state has no slope, whatever values that are not finite would make of it.
-                if self.built.depends[i].contains(&j) {
-                    column[i] = slope;
+        for (first, columns) in (0..n).step_by(LANES).zip(dfdx.chunks_mut(LANES * n)) {
+            let n_column = columns.len() / n;
+            let along: [Direction<'_>; LANES] = std::array::from_fn(|k| {
+                let x = self.unit.get((n - 1).wrapping_sub(first + k)..).unwrap_or_default();
+                Direction { x, ..Direction::default() }
+            });
+            hand_on(&self.built.rates, &at, &along[..n_column], &mut |i, _, slopes| {
+                for (j, (column, slope)) in (first..).zip(columns.chunks_exact_mut(n).zip(slopes)) {
+                    // A rate without the state has no slope, whatever values that are not finite would make of it.
+                    if self.built.depends[i].contains(&j) {
+                        column[i] = *slope;
+                    }
                 }
             });
         }
-        let along = Direction { t: 1.0, u: u.slope, ..Direction::default() };
-        self.built.rates.each_slope(&at, &along, |i, slope| dfdt[i] = slope);
+        let along = [Direction { t: 1.0, u: u.slope, ..Direction::default() }];
+        self.built.rates.each_along(&at, &along, |i, _, [slope]| dfdt[i] = slope);
         true
     }
+
+    fn slopes(&self) -> Result<&dyn Slopes, String> {
+        match &self.built.not_smooth {
+            Some(why) => Err(why.clone()),
+            None => Ok(self),
+        }
+    }
+}
+
+impl Slopes for EquationsModel {
+    fn initial(&self, theta: &[f64], along: &[Direction<'_>], take: &mut Take<'_>) {
+        hand_on(&self.built.initial, &At { t: 0.0, x: &[], theta, u: Drive::NONE, y: &[] }, along, take);
+    }
+
+    fn rhs(
+        &self,
+        t: f64,
+        x: &[f64],
+        theta: &[f64],
+        u: Drive<'_>,
+        along: &[Direction<'_>],
+        take: &mut Take<'_>,
+    ) {
+        hand_on(&self.built.rates, &At { t, x, theta, u, y: &[] }, along, take);
+    }
+
+    fn output(
+        &self,
+        t: f64,
+        x: &[f64],
+        theta: &[f64],
+        u: Drive<'_>,
+        along: &[Direction<'_>],
+        take: &mut Take<'_>,
+    ) {
+        hand_on(&self.built.outputs, &At { t, x, theta, u, y: &[] }, along, take);
+    }
+}
+
+/// Hands on values and derivatives along the directions, by code for as many of them or a few more.
+fn hand_on(programs: &Programs, at: &At<'_>, along: &[Direction<'_>], take: &mut Take<'_>) {
+    match along.len() {
+        0..=2 => padded::<2>(programs, at, along, take),
+        3..=4 => padded::<4>(programs, at, along, take),
+        _ => padded::<LANES>(programs, at, along, take),
+    }
+}
+
+fn padded<const N: usize>(programs: &Programs, at: &At<'_>, along: &[Direction<'_>], take: &mut Take<'_>) {
+    let mut all = [Direction::default(); N];
+    all[..along.len()].copy_from_slice(along);
+    programs.each_along(at, &all, |i, value, slopes| take(i, value, &slopes[..along.len()]));
 }

@@ -35,7 +35,7 @@ impl Program {
     /// When a slice in `at` is shorter than the slots that the program was compiled with.
     pub fn eval_dual(&self, at: &At<'_>, direction: &Direction<'_>) -> (f64, f64) {
         let mut found = (f64::NAN, f64::NAN);
-        self.tape.each(&Along(at, direction), |_, Dual(value, slope)| found = (value, slope));
+        self.tape.each(&Along(at, &[*direction]), |_, Dual(value, [slope])| found = (value, slope));
         found
     }
 
@@ -83,13 +83,13 @@ impl Programs {
         self.each(at, |i, value| values[i] = value);
     }
 
-    /// Hands on the derivative of every expression along a direction, with its position.
-    pub(crate) fn each_slope(
+    /// Hands on the value of every expression and its derivatives along directions, with its position.
+    pub(crate) fn each_along<const N: usize>(
         &self,
         at: &At<'_>,
-        direction: &Direction<'_>,
-        mut take: impl FnMut(usize, f64),
+        along: &[Direction<'_>; N],
+        mut take: impl FnMut(usize, f64, [f64; N]),
     ) {
-        self.0.each(&Along(at, direction), |i, Dual(_, slope)| take(i, slope));
+        self.0.each(&Along(at, along), |i, Dual(value, slopes)| take(i, value, slopes));
     }
 }

@@ -1,0 +1,115 @@
+//! Gauss–Newton with exact slopes finds what the batch fit with sigma points finds, with a run per record and iteration.
+#![allow(clippy::unwrap_used)]
+mod study_kit;
+
+use study_kit::{Case, Done, csv, grid, normals, run_once};
+
+/// x'' = −k x − c v − d |v| v, from a start of each record's own: the predictions are not linear in any of them.
+fn study(estimator: &str, rate: &str) -> String {
+    let parameter = |(name, median, factor): (&str, f64, f64)| {
+        format!(
+            "[[parameters]]\nname = \"{name}\"\nprior = {{ transform = \"log\", median = {median}, factor = {factor} }}\n"
+        )
+    };
+    let parameters: String =
+        [("k", 3.0, 1.5), ("c", 0.2, 3.0), ("d", 0.1, 3.0)].into_iter().map(parameter).collect();
+    let record = |name: &str| {
+        format!(
+            "[[records]]\nname = \"{name}\"\nfile = \"{name}.csv\"\nchannels = [{{ column = \"y\", output = \"y\", noise = 0.02 }}]\n"
+        )
+    };
+    format!(
+        r#"
+[study]
+name = "swing"
+[model]
+kind = "equations"
+outputs = [ {{ name = "y", value = "x" }} ]
+[[model.states]]
+name = "x"
+initial = 1.0
+rate = "v"
+[[model.states]]
+name = "v"
+initial = 0.0
+rate = "{rate}"
+{parameters}
+[[parameters]]
+name = "initial:x"
+per_record = true
+prior = {{ transform = "linear", median = 1.0, sd = 0.3 }}
+{}{}
+[estimator]
+{estimator}
+"#,
+        record("one"),
+        record("two")
+    )
+}
+
+const RATE: &str = "-k*x - c*v - d*abs(v)*v";
+
+/// Two recordings from different starts, by steps so short that their error is below that of a double.
+fn recordings() -> [(&'static str, String); 2] {
+    let times = grid(80, 0.1);
+    [("one.csv", 1.2, 5), ("two.csv", 0.7, 6)].map(|(name, start, seed)| {
+        let (mut x, mut v, mut z) = (start, 0.0_f64, vec![start]);
+        for _ in 1..times.len() {
+            for _ in 0..10_000 {
+                let h = 1e-5;
+                v += h * (-4.0 * x - 0.15 * v - 0.2 * v.abs() * v);
+                x += h * v;
+            }
+            z.push(x);
+        }
+        z.iter_mut().zip(normals(80, seed)).for_each(|(z, e)| *z += 0.02 * e);
+        (name, csv("time,y", &[&times, &z]))
+    })
+}
+
+fn fitted(estimator: &str) -> Done {
+    run_once(&study(estimator, RATE), &recordings())
+}
+
+#[test]
+fn it_finds_the_estimate_and_the_interval_of_the_fit_by_sigma_points() {
+    let (exact, by_points) = (fitted("kind = \"gauss-newton\""), fitted("kind = \"batch\"\nspread = 0.01"));
+    let close = |a: f64, b: f64, width: f64| (a - b).abs() < 0.02 * width;
+    for (a, b) in exact.summary.parameters.iter().zip(&by_points.summary.parameters) {
+        let width = b.interval95[1] - b.interval95[0];
+        // Both end within a hundredth of a posterior sd, a quarter of a hundredth of the interval.
+        assert!(close(a.estimate, b.estimate, width), "{a:?} and {b:?}");
+        assert!(close(a.interval95[0], b.interval95[0], width), "{a:?} and {b:?}");
+        assert!(close(a.interval95[1], b.interval95[1], width), "{a:?} and {b:?}");
+    }
+    let (a, b) = (exact.summary.fit.log_likelihood, by_points.summary.fit.log_likelihood);
+    assert!((a - b).abs() < 0.05, "{a} and {b}");
+    // Of two dampings the data know the sum; nothing else is doubtful.
+    assert!(
+        exact.summary.warnings.len() == 1 && exact.warns("c and d are correlated"),
+        "{:?}",
+        exact.summary.warnings
+    );
+}
+
+#[test]
+fn an_iteration_makes_one_run_of_each_record() {
+    let done = fitted("kind = \"gauss-newton\"");
+    let iterations = done.table("analyses", "step").len();
+    let of_fit = done.table("jobs", "pass").iter().filter(|row| row[0] == "1").count();
+    assert_eq!(of_fit, 2 * iterations);
+}
+
+#[test]
+fn where_there_are_no_derivatives_the_study_is_refused() {
+    let refused = |estimator: &str, rate: &str| {
+        Case::new(&study(estimator, rate), &recordings()).refusal().expect("a refusal")
+    };
+    let exact = "kind = \"gauss-newton\"";
+    let said = refused(exact, "-k*x - c*v - d*sign(v)");
+    assert!(said.contains("rate of `v` jumps") && said.contains("use kind = \"batch\""), "{said}");
+    let said = refused(&format!("{exact}\nspread = 0.1"), RATE);
+    assert!(said.contains("`spread` is of sigma points"), "{said}");
+    let said = refused(&format!("{exact}\npasses = 2"), RATE);
+    assert!(said.contains("`passes` belongs to kind = \"roukf\""), "{said}");
+}

@@ -1,0 +1,55 @@
+//! Derivatives of a model's equations along directions: what forward mode asks of a model.
+//!
+//! Next file to read: [`crate::sensitivity`], which carries them through a run.
+
+use crate::segment::Drive;
+
+/// Directions that are followed at once, at most: what an expression computes of the values themselves serves all of them.
+pub const LANES: usize = 8;
+
+/// A direction of differentiation; a slice that is too short counts as zero.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Direction<'a> {
+    /// Along time.
+    pub t: f64,
+    /// Along the states.
+    pub x: &'a [f64],
+    /// Along the parameters.
+    pub theta: &'a [f64],
+    /// Along the inputs.
+    pub u: &'a [f64],
+    /// Along the outputs.
+    pub y: &'a [f64],
+}
+
+/// Takes the value of a component, by its position, and its derivative along each of the directions.
+pub type Take<'a> = dyn FnMut(usize, f64, &[f64]) + 'a;
+
+/// The equations of a [`crate::Model`] with their derivatives along up to [`LANES`] directions. Arguments are those of the model's methods
+/// of the same names.
+pub trait Slopes {
+    /// The initial state.
+    fn initial(&self, theta: &[f64], along: &[Direction<'_>], take: &mut Take<'_>);
+
+    /// The rate of the state.
+    fn rhs(
+        &self,
+        t: f64,
+        x: &[f64],
+        theta: &[f64],
+        u: Drive<'_>,
+        along: &[Direction<'_>],
+        take: &mut Take<'_>,
+    );
+
+    /// The outputs.
+    fn output(
+        &self,
+        t: f64,
+        x: &[f64],
+        theta: &[f64],
+        u: Drive<'_>,
+        along: &[Direction<'_>],
+        take: &mut Take<'_>,
+    );
+}
