@@ -102,6 +102,7 @@ impl Solve for Inside {
             noise: None,
             sums: None,
             periods: Vec::new(),
+            slopes: false,
         };
         let theta =
             run.parameters.iter().copied().chain(run.initial.iter().map(|(_, value)| *value)).collect();

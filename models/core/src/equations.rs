@@ -30,6 +30,7 @@ mod parse;
 mod parsed;
 mod program;
 mod reach;
+mod smooth;
 mod tape;
 mod values;
 

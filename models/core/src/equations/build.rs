@@ -15,6 +15,7 @@ use super::node::Node;
 use super::noise::Noise;
 use super::parsed::{Parsed, Placed, fault};
 use super::program::{Program, Programs};
+use super::smooth;
 use crate::bounds::unbounded;
 use crate::integrate::Solver;
 use crate::memory::{self, Memory};
@@ -77,12 +78,11 @@ pub(super) fn build(def: &EquationsDef, constants: &BTreeMap<String, f64>) -> Re
     for term in parsed.rates.iter().flatten() {
         compile(term)?;
     }
-    let place = |name: &str| format!("rate of `{name}`");
     let rates: Vec<_> = names
         .states
         .iter()
         .map(|(name, node)| Placed {
-            place: place(name),
+            place: format!("rate of `{name}`"),
             expression: Expression::new(String::new(), node.clone()),
         })
         .map(|placed| compile(&placed))
@@ -92,19 +92,6 @@ pub(super) fn build(def: &EquationsDef, constants: &BTreeMap<String, f64>) -> Re
     let switches = switches(&rates, &names, &resolve)?;
     let spec = spec(def, &names, &parameters, &values);
     let memories = memories.take();
-    let placed = |at: String, e: &Expression| e.jumps(&|name| moves(&names, constants, name)).then_some(at);
-    let jump = rates.iter().zip(&names.states).find_map(|((e, _), (name, _))| placed(place(name), e));
-    let jump = jump.or_else(|| {
-        let outputs = values.iter().zip(&def.outputs);
-        outputs.into_iter().find_map(|((e, _), output)| placed(format!("output `{}`", output.name), e))
-    });
-    let not_smooth = match (jump, memories.first()) {
-        (Some(place), _) => Some(format!(
-            "its {place} jumps, by `sign`, `step`, `if` or a comparison of what parameters move"
-        )),
-        (None, Some(memory)) => Some(format!("it reads the past of `{}`", memory.of)),
-        (None, None) => None,
-    };
     Ok(Built {
         spec,
         initial: Programs::new(&initial),
@@ -112,11 +99,11 @@ pub(super) fn build(def: &EquationsDef, constants: &BTreeMap<String, f64>) -> Re
         rates: Programs::new(rates.iter().map(|(_, p)| p)),
         outputs: Programs::new(values.iter().map(|(_, p)| p)),
         noise,
+        not_smooth: smooth::fault(def, &names, constants, [&rates, &values], &memories),
         switches: Programs::new(&switches),
         sources: memories.iter().map(|memory| source(&memory.of, def, &names)).collect(),
         memories,
         solver,
-        not_smooth,
     })
 }
 
@@ -153,11 +140,6 @@ fn switches(
         e.compile(resolve, &|_| None).map_err(|error| fault("switching function".to_owned(), e.text(), error))
     };
     list.iter().map(compile).collect()
-}
-
-/// Whether a value changes with parameters that are estimated: states and outputs do, inputs and constants do not.
-fn moves(names: &Names<'_>, constants: &BTreeMap<String, f64>, name: &str) -> bool {
-    names.input(name).is_none() && !constants.contains_key(name)
 }
 
 fn spec(
