@@ -46,10 +46,10 @@ pub(crate) struct Args {
     /// Runs of the model at most (one particle over one record each); what is left untried is reported.
     #[arg(long, value_name = "RUNS")]
     budget: Option<u64>,
-    /// Leave out this effect (may be given several times).
+    /// Leave out this effect, at all of its places where none is named (may be given several times).
     #[arg(long, value_name = "EFFECT")]
     without: Vec<String>,
-    /// Try this effect and no other (may be given several times).
+    /// Try this effect and no other, at all of its places where none is named (may be given several times).
     #[arg(long, value_name = "EFFECT")]
     only: Vec<String>,
     /// Effects at most in one explanation.

@@ -7,6 +7,7 @@ use std::collections::HashSet;
 
 use starlings_estimators::Transform;
 use starlings_models::effect::{EffectDef, EffectParameter};
+use starlings_models::equations::Expression;
 use starlings_study::variant::EffectPrior;
 
 use super::kind::Kind;
@@ -54,6 +55,15 @@ impl Candidate {
     /// Its name.
     pub(crate) fn name(&self) -> &str {
         &self.def.name
+    }
+
+    /// Whether its amplitude stands in the rate of a state of its own, as of a store that fills the faster the more it takes.
+    pub(crate) fn moves_own_state(&self) -> bool {
+        let Some(amplitude) = self.def.parameters.first() else { return false };
+        let names = |rate: &str| {
+            Expression::parse(rate).is_ok_and(|e| e.names().iter().any(|(name, _)| *name == amplitude.name))
+        };
+        self.def.states.iter().any(|state| names(&state.rate))
     }
 
     /// Number of values inside its terms, but for widths that round a corner.

@@ -53,7 +53,7 @@ pub(crate) enum Nature {
     Larger,
     /// Smaller than the stated noise, and not shown to be correlated.
     Smaller,
-    /// Correlated in time, but smaller than what the stated noise would hide.
+    /// Correlated in time, but no larger than the stated noise, and so that smooth signals stand out of them as of white noise.
     Hidden,
 }
 
@@ -96,7 +96,8 @@ impl Adequacy {
         }
         let square = self.rmse_over_noise.powi(2);
         if self.whiteness.is_some_and(|p| p < NOT_WHITE) {
-            let hidden = self.inflation <= 1.0 && square < AS_STATED[0];
+            // No larger than the noise, and smooth signals are known in them no worse than in white noise: correlation between neighbours alone.
+            let hidden = self.inflation <= 1.0 && square <= 1.0;
             return if hidden { Nature::Hidden } else { Nature::Correlated };
         }
         let (lo, hi) = self.band(LEVEL);
@@ -114,7 +115,7 @@ impl Adequacy {
         nis_band_of_uncertain_noise(self.n, self.noise_freedom, level)
     }
 
-    /// Whether the residuals are white, or their correlation is hidden by the stated noise.
+    /// Whether the residuals are white, or their correlation is one that the stated noise covers.
     pub(crate) fn could_be_white(&self) -> bool {
         self.nature() != Nature::Correlated
     }

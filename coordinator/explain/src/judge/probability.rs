@@ -21,6 +21,8 @@ const NAMED: f64 = 0.21;
 const TIED: f64 = 0.5;
 /// ... and of `unexplained`.
 const UNEXPLAINED: f64 = 45.0;
+/// The same at least of a name or a tie whose residuals are too few to be tested for correlation: what is not in the list would pass as well.
+const UNTESTED: f64 = 1.0;
 /// Sets and their probabilities that are told in words.
 const TOLD: usize = 4;
 /// Probability below which a set is not spoken of.
@@ -82,6 +84,8 @@ pub(crate) fn probabilities(
         Verdict::NoGap => return None,
     };
     let is_answered = decision.verdict != Verdict::Unexplained;
+    let is_untested = decision.best.is_some_and(|i| found.judged[i].adequacy.whiteness.is_none());
+    let odds = if is_untested { odds.max(UNTESTED) } else { odds };
     let counted: Vec<&JudgedFit<'_>> = found.judged.iter().filter(|j| counts(j, is_answered)).collect();
     let best = decision.best.map(|i| &found.judged[i]);
     let nearest = best.or(counted.first().copied());

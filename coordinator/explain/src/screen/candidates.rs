@@ -34,7 +34,8 @@ pub fn candidates(study: &Study, options: &Options) -> Result<Vec<EffectDef>, Ex
     let own = |effect: &EffectDef| study.candidates.iter().any(|c| c.name == effect.name);
     let is_in = |list: &[String], effect: &EffectDef| {
         let family = || family_of(&effect.name).filter(|_| !own(effect));
-        list.contains(&effect.name) || family().is_some_and(|f| list.iter().any(|name| name == f))
+        list.iter().any(|name| names(name, &effect.name))
+            || family().is_some_and(|f| list.iter().any(|name| name == f))
     };
     let in_model = |effect: &EffectDef| {
         study.setup.effects.iter().any(|known| known.name == effect.name || known.adds == effect.adds)
@@ -124,14 +125,19 @@ pub fn check(study: &Study, options: &Options) -> Result<(), ExplainError> {
 }
 
 /// Refuses an unknown name of an effect or a family. An effect that the model has already may be named; this has no influence.
+/// Whether a name is that of an effect, or of an effect at any of its places: `leak` is `leak:h1` and `leak:h2` too.
+fn names(name: &str, effect: &str) -> bool {
+    effect.strip_prefix(name).is_some_and(|place| place.is_empty() || place.starts_with(':'))
+}
+
 fn check_name(name: &str, study: &Study, all: &[&EffectDef]) -> Result<(), ExplainError> {
     let effects = all.iter().copied().chain(&study.setup.effects).map(|e| e.name.as_str());
-    let names: Vec<&str> =
+    let known: Vec<&str> =
         effects.chain(FAMILIES.iter().map(|family| family.name)).chain([PROPOSALS]).collect();
-    if names.contains(&name) {
+    if known.iter().any(|known| names(name, known)) {
         return Ok(());
     }
-    let help = match nearest(name, &names) {
+    let help = match nearest(name, &known) {
         Some(near) => format!("did you mean `{near}`?"),
         None => "`starlings effects STUDY` lists what would be tried".to_owned(),
     };

@@ -66,7 +66,7 @@ pub(crate) fn headline(
             format!(
                 "{}{}{} {}{}",
                 tied(&judged.fit.variant.name(), &subject(judged), &decision.tied),
-                likelier(judged, decision, candidates),
+                likelier(judged, decision, found, candidates),
                 same(decision),
                 capital(&shrinking(cache, found, judged)),
                 remains(judged)
@@ -169,9 +169,22 @@ fn of_no_field(judged: &JudgedFit<'_>) -> &'static str {
     }
 }
 
-/// That what is told first of a tie is so by the prior; empty where all of the tied are of its kind.
-fn likelier(judged: &JudgedFit<'_>, decision: &Decision, candidates: &[Candidate]) -> String {
+/// That what is told first of a tie is so by the prior, or as the simplest of its kind; empty where all of the tied are of its kind.
+fn likelier(
+    judged: &JudgedFit<'_>,
+    decision: &Decision,
+    found: &SearchResult<'_>,
+    candidates: &[Candidate],
+) -> String {
     let told = judged.kinds().first().copied().unwrap_or_default();
+    let rivals = decision.rivals.iter().map(|i| &found.judged[*i]);
+    let best = rivals.max_by(|a, b| a.standing().total_cmp(&b.standing()));
+    if let Some(best) =
+        best.filter(|best| best.standing() > judged.standing() && best.kinds() == judged.kinds())
+    {
+        let (first, supported) = (judged.fit.variant.name(), best.fit.variant.name());
+        return format!(" `{first}` is told first as the simpler form; the data support `{supported}` more.");
+    }
     let tied = decision.tied.iter().flatten();
     let kinds = tied.filter_map(|name| candidates.iter().find(|c| c.name() == name)).map(|c| c.kind);
     kinds.filter(|kind| *kind > told).max().map_or_else(String::new, |other| {
