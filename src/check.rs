@@ -174,7 +174,11 @@ fn print(study: &Study, channels: &[TrialChannel], ensemble: (usize, bool)) -> R
             format!("pass, {least} to {most} passes: as many as the estimate takes to settle")
         }
     };
-    line(format_args!("\n{} particles, {runs} runs of the model per {per}", ensemble.0))?;
+    if study.estimator.kind.has_exact_slopes() {
+        line(format_args!("\n{runs} runs of the model with their slopes per {per}"))?;
+    } else {
+        line(format_args!("\n{} particles, {runs} runs of the model per {per}", ensemble.0))?;
+    }
     if let Some(states) = states_text(study) {
         line(states)?;
     }

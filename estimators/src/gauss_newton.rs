@@ -1,7 +1,8 @@
 //! Gauss–Newton with the model's own derivatives: the batch fit whose sigma points need no runs.
 //!
 //! Where the slope at the centre is known, what a sigma point would predict of the linear model is a sum; the regression of the batch fit
-//! gives the slope back, whatever the points and their width. So both fits are one: the same steps, damping and end. Read next: `batch.rs`.
+//! gives the slope back, whatever the points and their width. So both fits are one: the same steps, damping and end.
+//! Where steps are rejected again and again the batch fit measures the slope anew with closer points; here it comes out the same. Read next: `batch.rs`.
 
 use nalgebra::{DMatrix, DVector};
 

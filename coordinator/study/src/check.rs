@@ -208,10 +208,8 @@ fn checked(
     let (units, candidate_warnings) = units::warnings(&file, &model, &records);
     warnings.extend(units);
     let theta = expand::theta(&parameters, &records);
-    let described = (model.setup, model.spec);
-    let (observers, processes, predicted) =
-        (file.observer.clone(), walks::places(&file), file.predict.span.clone());
-    let kind = file.estimator.kind.as_ref().map(toml::Spanned::span);
+    let (kind, observers) = (slopes::place(&file.estimator), file.observer.clone());
+    let (processes, predicted) = (walks::places(&file), file.predict.span.clone());
     let study = Study {
         candidates: Arc::new(model.candidates),
         parameters,
@@ -224,7 +222,7 @@ fn checked(
         runs_here: solver.is_none_or(|known| known.is_here),
         warnings,
         candidate_warnings,
-        ..study_of(path, source, file, described, (fleet, estimator), solver_host)
+        ..study_of(path, source, file, (model.setup, model.spec), (fleet, estimator), solver_host)
     };
     slopes::check(source, kind, &study);
     walks::check(source, &processes, predicted, &study);

@@ -14,7 +14,7 @@ use super::surfaces::Node;
 
 impl Record {
     /// The channels that were measured as surfaces.
-    fn surfaces(&self) -> impl Iterator<Item = (&Channel, &Node)> {
+    pub(crate) fn surfaces(&self) -> impl Iterator<Item = (&Channel, &Node)> {
         self.channels.iter().filter_map(|channel| Some((channel, channel.node.as_ref()?)))
     }
 }

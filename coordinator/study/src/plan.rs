@@ -59,6 +59,12 @@ impl Study {
         Setup { slopes: true, ..self.setup.clone() }
     }
 
+    /// The window with room for the outputs and their derivatives by every value of a job.
+    pub(crate) fn widened(&self, window: &Window) -> Arc<Window> {
+        let n = window.observed.len() * (1 + self.parameters.len());
+        Arc::new(Window { observed: vec![f64::NAN; n], ..window.clone() })
+    }
+
     /// The window that is asked for where this one is wanted from the record's start: all times of the record where the solver
     /// answers for nothing less, the values of the others missing.
     pub(super) fn asked(&self, record: usize, window: &Arc<Window>) -> Arc<Window> {

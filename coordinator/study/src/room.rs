@@ -18,7 +18,7 @@ impl Study {
     /// resume starts from, twice while they are replaced.
     pub fn bytes_of_a_run(&self) -> u64 {
         let p = self.theta.len();
-        let particles = SigmaSet::new(self.estimator.points, p).map_or(p + 1, |set| set.n_particle());
+        let particles = self.n_particle();
         let times: usize = self.records.iter().map(|record| record.times.len()).sum();
         let values = (times * self.setup.outputs.len()) as u64;
         let records = self.records.len();
@@ -35,6 +35,15 @@ impl Study {
         rows + values * innovation + 2 * self.bytes_of_states()
     }
 
+    /// Runs of an ensemble over a record.
+    fn n_particle(&self) -> usize {
+        let p = self.theta.len();
+        if self.estimator.kind.has_exact_slopes() {
+            return 1;
+        }
+        SigmaSet::new(self.estimator.points, p).map_or(p + 1, |set| set.n_particle())
+    }
+
     /// Whether a state of the model travels by itself, in pieces.
     pub fn has_large_states(&self) -> bool {
         self.spec.n_state() * 8 > MAX_INLINE_STATE
@@ -42,8 +51,6 @@ impl Study {
 
     /// Bytes of the states of all particles of all records.
     pub fn bytes_of_states(&self) -> u64 {
-        let p = self.theta.len();
-        let particles = SigmaSet::new(self.estimator.points, p).map_or(p + 1, |set| set.n_particle());
-        (self.spec.n_state() * particles * self.records.len() * 8) as u64
+        (self.spec.n_state() * self.n_particle() * self.records.len() * 8) as u64
     }
 }

@@ -18,8 +18,9 @@ use std::collections::BTreeMap;
 use crate::SetupError;
 use crate::binding::Binding;
 use crate::effect::Addition;
+use crate::job_check::check_job;
 use crate::setup::Setup;
-use crate::simulator::{check_job, free_names};
+use crate::simulator::free_names;
 use crate::solver::Description;
 use crate::{
     Forward, Job, ModelFailure, ObserverDef, ParticleError, Prediction, Signal, Spec, Stop, Until, Window,

@@ -20,6 +20,7 @@ mod failure;
 mod inputs;
 pub mod integrate;
 mod job;
+mod job_check;
 pub mod layout;
 pub mod limits;
 pub mod memory;

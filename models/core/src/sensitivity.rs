@@ -28,7 +28,7 @@ impl Sensitive {
     /// Adds the derivatives by the values that a job gives.
     ///
     /// # Errors
-    /// When the model has no derivatives, or a state of noise.
+    /// When the model has no derivatives.
     pub(crate) fn new(inner: Box<dyn Model>, binding: &Binding) -> Result<Self, SetupError> {
         let kind = &inner.spec().kind;
         if let Err(why) = inner.slopes() {
@@ -70,7 +70,7 @@ impl Sensitive {
 
     /// Puts values and derivatives, which `evaluate` hands on for the given directions, into their places: `n` values and `n` derivatives by
     /// each value of a job.
-    fn spread(
+    fn place(
         &self,
         n: usize,
         x: &[f64],
@@ -100,7 +100,7 @@ impl Model for Sensitive {
 
     fn initial(&self, theta: &[f64], x: &mut [f64]) {
         let n = self.n();
-        self.spread(n, &[], x, |slopes, along, take| slopes.initial(theta, along, take));
+        self.place(n, &[], x, |slopes, along, take| slopes.initial(theta, along, take));
         for (column, value) in x.chunks_exact_mut(n).skip(1).zip(&self.values) {
             for &i in &self.given {
                 column[i] = 0.0;
@@ -113,12 +113,12 @@ impl Model for Sensitive {
 
     fn rhs(&self, t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, dx: &mut [f64]) {
         let n = self.n();
-        self.spread(n, x, dx, |slopes, along, take| slopes.rhs(t, &x[..n], theta, u, along, take));
+        self.place(n, x, dx, |slopes, along, take| slopes.rhs(t, &x[..n], theta, u, along, take));
     }
 
     fn output(&self, t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, y: &mut [f64]) {
         let (n, n_output) = (self.n(), self.inner.spec().n_output());
-        self.spread(n_output, x, y, |slopes, along, take| slopes.output(t, &x[..n], theta, u, along, take));
+        self.place(n_output, x, y, |slopes, along, take| slopes.output(t, &x[..n], theta, u, along, take));
     }
 
     fn solver(&self) -> Solver {

@@ -8,6 +8,7 @@ use crate::SetupError;
 use crate::binding::Binding;
 use crate::effect;
 use crate::inputs::Inputs;
+use crate::job_check::{bad, check_job};
 use crate::limits::{Limits, MAX_STEPS, TIMEOUT};
 use crate::memory::with_memories;
 use crate::noise::WhiteNoise;
@@ -19,7 +20,7 @@ use crate::setup::Setup;
 use crate::spans::Spans;
 use crate::{
     Drive, Forward, Job, Model, ModelFailure, NativeModels, ParticleError, Prediction, Spec, Stop, Timeout,
-    Until, Window, nearest,
+    Until, nearest,
 };
 
 /// A model, its observer, and the way from a job's values to its parameters.
@@ -80,8 +81,12 @@ impl Simulator {
         binding: Binding,
         rows: &[Row],
     ) -> Result<Self, SetupError> {
-        if !setup.observer.is_off() || !setup.periods.is_empty() {
-            let what = if setup.periods.is_empty() { "under an observer" } else { "from a periodic start" };
+        let refused = [
+            (!setup.observer.is_off(), "under an observer"),
+            (!setup.periods.is_empty(), "from a periodic start"),
+            (setup.noise.is_some(), "with noise"),
+        ];
+        if let Some((_, what)) = refused.into_iter().find(|(is_so, _)| *is_so) {
             return Err(SetupError::Invalid(format!("derivatives of a run {what} are not to be had")));
         }
         let (n_state, n_output) = (model.spec().n_state(), model.spec().n_output());
@@ -219,57 +224,6 @@ impl Simulator {
             format!("the run computed for more than {limit} s (`timeout` in `[model]` sets the limit)");
         Timeout { limit, says }
     }
-}
-
-/// Refuses a job whose lengths or times do not fit: so many parameter values, so many rows, the inputs of the specification.
-pub(crate) fn check_job(job: &Job, n_value: usize, n_row: usize, spec: &Spec) -> Result<(), ParticleError> {
-    let window = &*job.window;
-    let (given, wanted) = (job.theta.len(), n_value);
-    if given != wanted {
-        return Err(bad(format!("{given} parameter values for {wanted} parameters")));
-    }
-    let (given, wanted) = (window.observed.len(), n_row * window.times.len());
-    if given != wanted {
-        return Err(bad(format!("{given} observed values where outputs times times make {wanted}")));
-    }
-    if !(window.since.is_empty() || window.since.len() == n_row) {
-        return Err(bad(format!("{} times of last values for {n_row} rows", window.since.len())));
-    }
-    if !window.since.iter().all(|last| *last <= window.start) {
-        return Err(bad("a last value before the window that is not before its start".to_owned()));
-    }
-    let (given, wanted) = (window.inputs.len(), spec.inputs.len());
-    if given != wanted {
-        return Err(bad(format!("{given} input signals for a model with {wanted}")));
-    }
-    for (signal, input) in window.inputs.iter().zip(&spec.inputs) {
-        if signal.times.len() != signal.values.len() || signal.times.is_empty() {
-            let (times, values) = (signal.times.len(), signal.values.len());
-            return Err(bad(format!("input `{}` has {times} times and {values} values", input.name)));
-        }
-        if !signal.times.is_sorted_by(|a, b| a < b) {
-            return Err(bad(format!("the times of input `{}` do not increase", input.name)));
-        }
-    }
-    check_times(window)
-}
-
-/// Refuses a window without times, with times out of order or before its start.
-fn check_times(window: &Window) -> Result<(), ParticleError> {
-    let Some(&first) = window.times.first() else {
-        return Err(bad("a window without observation times".to_owned()));
-    };
-    if !window.start.is_finite() || !window.times.iter().all(|t| t.is_finite()) {
-        return Err(bad("a window with a time that is not finite".to_owned()));
-    }
-    if first < window.start || !window.times.is_sorted_by(|a, b| a < b) {
-        return Err(bad("observation times must increase from the window's start".to_owned()));
-    }
-    Ok(())
-}
-
-fn bad(message: String) -> ParticleError {
-    ParticleError::BadJob(message)
 }
 
 /// The names that only terms of effects use, so that a constant may have them.

@@ -67,7 +67,7 @@ impl Written<'_> {
         forward.run(&job(theta, times, self.outputs.len())).unwrap().outputs
     }
 
-    /// Holds the derivatives to central differences of this relative step, to `within` of the largest.
+    /// Holds the derivatives by each value to central differences of this relative step, to `within` of the largest of them.
     fn compare(&self, parameters: &[&str], theta: &[f64], times: &[f64], (step, within): (f64, f64)) {
         let (n, p) = (self.outputs.len(), parameters.len());
         let found = self.with_slopes(parameters, theta, times);
@@ -87,7 +87,7 @@ impl Written<'_> {
             let h = step * theta[j].abs().max(1.0);
             let differences: Vec<f64> =
                 moved(h).iter().zip(moved(-h)).map(|(after, before)| (after - before) / (2.0 * h)).collect();
-            let size = differences.iter().fold(0.0, |size: f64, d| size.max(d.abs())).max(1.0);
+            let size = differences.iter().fold(0.0, |size: f64, d| size.max(d.abs()));
             for (k, expected) in differences.iter().enumerate() {
                 let got = found[(k / n) * n * (1 + p) + (1 + j) * n + k % n];
                 assert!(
@@ -151,7 +151,7 @@ fn of_an_oscillator_with_kinks_and_more_values_than_are_followed_at_once_they_ar
         step: None,
     };
     let names = ["k", "c", "d", "s", "g", "q", "x0", "b"];
-    swing.compare(&names, &[4.0, 0.2, 0.3, 2.0, 0.2, 1.0, 0.8, 0.1], &grid(20, 0.3), (1e-4, 2e-5));
+    swing.compare(&names, &[4.0, 0.2, 0.3, 2.0, 0.2, 1.0, 0.8, 0.1], &grid(20, 0.3), (1e-3, 2e-3));
 }
 
 #[test]
@@ -162,7 +162,7 @@ fn of_a_stiff_system_they_are_differences() {
         constants: &[],
         step: None,
     };
-    stiff.compare(&["k", "c"], &[2000.0, 30.0], &grid(10, 0.4), (1e-3, 2e-5));
+    stiff.compare(&["k", "c"], &[2000.0, 30.0], &grid(10, 0.4), (1e-2, 5e-3));
 }
 
 #[test]
@@ -195,8 +195,14 @@ fn what_jumps_or_remembers_has_none_and_says_why() {
     assert!(refused(&estimated, estimated.setup(&["c", "t0"])).contains("jumps"));
     let past = Written { states: &[["x", "1", "-c*delay(x, 0.3)"]], outputs: &[["y", "x"]], ..DECAY };
     assert!(refused(&past, past.setup(&["c"])).contains("reads the past of `x`"));
+    let started = Written { states: &[["x", "if(a > 1, 1, 2)", "-k*x"]], outputs: &[["y", "x"]], ..DECAY };
+    assert!(refused(&started, started.setup(&["a", "k"])).contains("initial value of `x` jumps"));
     let observer = ObserverDef { kind: "nudging".to_owned(), gain: 1.0, ..ObserverDef::default() };
     let watched = Written { outputs: &[["y", "x"]], ..DECAY };
     let setup = Setup { observer, ..watched.setup(&["a", "k"]) };
     assert!(refused(&watched, setup).contains("under an observer"));
+    let setup = Setup { periods: vec![1.0], ..watched.setup(&["a", "k"]) };
+    assert!(refused(&watched, setup).contains("from a periodic start"));
+    let setup = Setup { noise: Some(7), ..watched.setup(&["a", "k"]) };
+    assert!(refused(&watched, setup).contains("with noise"));
 }

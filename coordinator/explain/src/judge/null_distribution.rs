@@ -160,7 +160,7 @@ mod tests {
                 score,
                 failure: None,
                 is_significant: false,
-                is_open: false,
+                may_be_imitated: false,
             }
         };
         let screening: Vec<ScreeningResult> = (0..n_candidate).map(result).collect();

@@ -176,7 +176,7 @@ impl<'c> Searcher<'_, '_, 'c> {
         let least = (LEAST * noise).min(SHARE * excess).max(LEAST);
         for result in &mut results {
             result.is_significant = self.asked || result.score.gain > least;
-            result.is_open = self.asked || self.candidates[result.candidate].moves_own_state();
+            result.may_be_imitated = self.asked || self.candidates[result.candidate].moves_own_state();
         }
         Ok(results)
     }

@@ -124,12 +124,12 @@ pub fn check(study: &Study, options: &Options) -> Result<(), ExplainError> {
     }
 }
 
-/// Refuses an unknown name of an effect or a family. An effect that the model has already may be named; this has no influence.
 /// Whether a name is that of an effect, or of an effect at any of its places: `leak` is `leak:h1` and `leak:h2` too.
 fn names(name: &str, effect: &str) -> bool {
     effect.strip_prefix(name).is_some_and(|place| place.is_empty() || place.starts_with(':'))
 }
 
+/// Refuses an unknown name of an effect or a family. An effect that the model has already may be named; this has no influence.
 fn check_name(name: &str, study: &Study, all: &[&EffectDef]) -> Result<(), ExplainError> {
     let effects = all.iter().copied().chain(&study.setup.effects).map(|e| e.name.as_str());
     let known: Vec<&str> =

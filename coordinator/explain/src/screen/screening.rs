@@ -182,7 +182,7 @@ fn incompatible(candidate: usize, point: &[f64], error: &SetupError) -> Screenin
         score: NO_SCORE,
         failure: Some(Unmeasured::Failed(error.to_string())),
         is_significant: false,
-        is_open: false,
+        may_be_imitated: false,
     }
 }
 
@@ -194,5 +194,13 @@ fn finished(probe: Probe<'_>) -> ScreeningResult {
         }
         Err(failure) => (Influence::none(), NO_SCORE, Some(failure)),
     };
-    ScreeningResult { candidate, point, influence, score, failure, is_significant: false, is_open: false }
+    ScreeningResult {
+        candidate,
+        point,
+        influence,
+        score,
+        failure,
+        is_significant: false,
+        may_be_imitated: false,
+    }
 }

@@ -28,9 +28,9 @@ pub(crate) struct ScreeningResult {
     pub failure: Option<Unmeasured>,
     /// Whether it gains more than chance in units of the effective noise, or was asked for by name.
     pub is_significant: bool,
-    /// Whether it is refitted whatever its slope at amplitude zero says of it: it was asked for by name, or moves a state of its own, which
-    /// stands still at that slope.
-    pub is_open: bool,
+    /// Whether it may be refitted though the parameters imitate its slope at amplitude zero: it was asked for by name, or moves a state of its
+    /// own, which stands still at that slope. It must gain more than chance all the same.
+    pub may_be_imitated: bool,
 }
 
 /// The candidate changes nothing that is measured.
@@ -79,7 +79,7 @@ impl ScreeningResult {
     pub(crate) fn is_imitated(&self) -> bool {
         self.failure.is_none()
             && self.score.identifiable < IMITATED
-            && !(self.is_open && self.score.sd.is_finite())
+            && !(self.may_be_imitated && self.score.sd.is_finite())
     }
 }
 
@@ -96,13 +96,13 @@ mod tests {
             score: Score { gain: 4e4, amplitude: 1.0, sd: 0.01, identifiable },
             failure: None,
             is_significant,
-            is_open: false,
+            may_be_imitated: false,
         };
         assert!(!result(0.03, true).is_absorbed(), "two hundred standard deviations are no imitation");
         assert!(result(0.03, false).is_absorbed());
         assert!(result(0.001, true).is_absorbed(), "the curvature of the response");
         assert!(!result(0.06, false).is_absorbed());
-        let asked = ScreeningResult { is_open: true, ..result(0.001, true) };
+        let asked = ScreeningResult { may_be_imitated: true, ..result(0.001, true) };
         assert!(!asked.is_absorbed(), "its slope at zero may say nothing of what it does where it matters");
     }
 }

@@ -169,7 +169,8 @@ fn of_no_field(judged: &JudgedFit<'_>) -> &'static str {
     }
 }
 
-/// That what is told first of a tie is so by the prior, or as the simplest of its kind; empty where all of the tied are of its kind.
+/// That what is told first of a tie is the simplest of its kind, where another one is better supported, or is of the likelier kind; empty where it
+/// is first by the data.
 fn likelier(
     judged: &JudgedFit<'_>,
     decision: &Decision,

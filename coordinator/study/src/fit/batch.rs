@@ -43,7 +43,7 @@ pub(crate) fn fit(
     let values: Vec<f64> = windows.iter().flat_map(|(_, w)| w.observed.iter().copied()).collect();
     let noise = noise(study, &windows, 1.0);
     let exact = study.estimator.kind.has_exact_slopes();
-    let plan = WorkPlan::new(study, if exact { 1 } else { batch.set.n_particle() + 1 });
+    let plan = WorkPlan::new(study, if exact { slopes::weight(study) } else { batch.set.n_particle() + 1 });
     let mut settling = Settling::default();
     let mut now = match resumed {
         Some(snapshot) => {

@@ -115,7 +115,7 @@ impl<'a> EnsembleRunner<'a> {
         windows: &StepWindows,
     ) -> Result<Results, RunError> {
         let slopes = self.wants_slopes(at);
-        let wide = |window: Arc<Window>| if slopes { self.widened(&window) } else { window };
+        let wide = |window: Arc<Window>| if slopes { self.study.widened(&window) } else { window };
         let sent: StepWindows =
             windows.iter().map(|(record, window)| (*record, wide(self.sent(*record, window)))).collect();
         let study = self.study;
@@ -208,12 +208,6 @@ impl<'a> EnsembleRunner<'a> {
     /// Whether the runs for this analysis predict derivatives beside the outputs.
     fn wants_slopes(&self, at: AnalysisIndex) -> bool {
         at.is_of_fit() && self.study.estimator.kind.has_exact_slopes()
-    }
-
-    /// The window with room for the outputs and their derivatives by every value of a job.
-    fn widened(&self, window: &Window) -> Arc<Window> {
-        let n = window.observed.len() * (1 + self.study.parameters.len());
-        Arc::new(Window { observed: vec![f64::NAN; n], ..window.clone() })
     }
 
     /// The window that a job carries: what the solver answers for, with what an observer knows.

@@ -8,6 +8,11 @@ use starlings_estimators::{Batch, BatchState};
 use super::runner::{Predicted, StepWindows};
 use crate::Study;
 
+/// About how many plain runs one with slopes takes; `models/core/benches/sensitivities.rs` measures it.
+pub(super) fn weight(study: &Study) -> usize {
+    3 + study.parameters.len() / 2
+}
+
 /// What the sigma points would predict where the model is linear around the centre, and which of them failed: all where the run of a record
 /// did. `results` has the run of every window, with its derivatives.
 pub(super) fn as_points(

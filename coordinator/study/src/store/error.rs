@@ -56,7 +56,9 @@ impl StoreError {
 fn remedy(path: &Path, source: &rusqlite::Error) -> &'static str {
     match source.sqlite_error_code() {
         // What cannot be made whole is removed.
-        Some(rusqlite::ErrorCode::DiskFull | rusqlite::ErrorCode::SystemIoFailure) if !path.exists() => {
+        Some(rusqlite::ErrorCode::DiskFull | rusqlite::ErrorCode::SystemIoFailure)
+            if path.try_exists().is_ok_and(|is_there| !is_there) =>
+        {
             "; the disk failed or is full, and nothing was begun: see that it has space and start again"
         }
         Some(rusqlite::ErrorCode::DiskFull) => {

@@ -36,7 +36,14 @@ pub fn dry_run(study: &mut Study, kind: &Kind, depth: Depth) -> Result<Vec<Trial
         return Ok(Vec::new());
     }
     let model = study.solver_host.build(&study.setup)?;
-    dry_run_by(study, kind, depth, &Here(&*model))
+    let channels = dry_run_by(study, kind, depth, &Here(&*model))?;
+    if kind.has_exact_slopes() {
+        let sensitive = study.solver_host.build(&study.with_slopes())?;
+        for record in (0..study.records.len()).filter(|record| study.records[*record].is_trained()) {
+            DryRun::new(study, &Here(&*sensitive), record).with_slopes()?;
+        }
+    }
+    Ok(channels)
 }
 
 /// The same by whoever makes the runs.
@@ -111,6 +118,15 @@ impl<'a> DryRun<'a> {
             let prediction = self.run(&window, state).map_err(|fault| self.failed(fault, span()))?;
             state = Some(prediction.state);
         }
+        Ok(())
+    }
+
+    /// The training span with its slopes, which take more steps than the outputs alone.
+    fn with_slopes(&self) -> Result<(), TrialError> {
+        let window = self.study.widened(&self.study.whole(self.record, true));
+        let span = || format!("with its slopes, from {} to {}", window.start, end(&window));
+        run(self.model, self.record, &window, &self.theta, None)
+            .map_err(|fault| self.failed(fault, span()))?;
         Ok(())
     }
 

@@ -91,7 +91,8 @@ impl Expression {
         list
     }
 
-    /// Whether the value may jump where something moves: where a sign, a step, a comparison or a condition looks at one of the names.
+    /// Whether the value may jump where something moves: where a sign, a step, a comparison, a condition or the
+    /// time at which the slope of an input is read looks at one of the names.
     pub(super) fn jumps(&self, moves: &dyn Fn(&str) -> bool) -> bool {
         let mut found = false;
         self.node.walk(&mut |part| {
@@ -99,7 +100,12 @@ impl Expression {
                 part,
                 Node::Call(Function::Abs, _) | Node::Pair(Operation::Min | Operation::Max, ..)
             );
-            if let Some(g) = switching(part).filter(|_| !has_kink_only) {
+            let decides = match part {
+                // The slope of an input jumps at its samples.
+                Node::DelayedSlope(_, tau) => Some((**tau).clone()),
+                _ => switching(part).filter(|_| !has_kink_only),
+            };
+            if let Some(g) = decides {
                 g.walk(&mut |n| found |= n.name().is_some_and(|name| moves(&name.text)));
             }
         });
