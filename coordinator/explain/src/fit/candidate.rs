@@ -147,6 +147,7 @@ fn inner_prior(parameter: &EffectParameter) -> EffectPrior {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use starlings_models::EffectState;
 
     fn effect(parameters: Vec<EffectParameter>) -> EffectDef {
         EffectDef { name: "e".to_owned(), parameters, ..EffectDef::default() }
@@ -164,6 +165,16 @@ mod tests {
         assert_eq!(candidate.points[0], [2.0, 6.0]);
         assert_eq!(candidate.points.len(), 6);
         assert!((candidate.sign() - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_store_that_its_amplitude_fills_moves_a_state_of_its_own() {
+        let of = |rate: &str| {
+            let amplitude = EffectParameter { name: "a".to_owned(), ..EffectParameter::default() };
+            let state = EffectState { name: "s".to_owned(), rate: rate.to_owned(), ..EffectState::default() };
+            Candidate::new(EffectDef { states: vec![state], ..effect(vec![amplitude]) }).moves_own_state()
+        };
+        assert!(of("r*a*(x - s)") && !of("(x - s)/tau"));
     }
 
     #[test]

@@ -77,15 +77,10 @@ pub(crate) fn probabilities(
     decision: &Decision,
     n_train: usize,
 ) -> Option<Probabilities> {
-    let odds = match decision.verdict {
-        Verdict::Named => NAMED,
-        Verdict::Tie => TIED,
-        Verdict::Unexplained => UNEXPLAINED,
-        Verdict::NoGap => return None,
-    };
+    if decision.verdict == Verdict::NoGap {
+        return None;
+    }
     let is_answered = decision.verdict != Verdict::Unexplained;
-    let is_untested = decision.best.is_some_and(|i| found.judged[i].adequacy.whiteness.is_none());
-    let odds = if is_untested { odds.max(UNTESTED) } else { odds };
     let counted: Vec<&JudgedFit<'_>> = found.judged.iter().filter(|j| counts(j, is_answered)).collect();
     let best = decision.best.map(|i| &found.judged[i]);
     let nearest = best.or(counted.first().copied());
@@ -113,10 +108,22 @@ pub(crate) fn probabilities(
         }
     }
     weights.retain(|(set, _)| !decision.synonyms.contains(&set.names.join(" + ")));
-    let of_verdict = odds * UNLISTED / (1.0 - UNLISTED);
+    let is_untested = best.is_some_and(|j| j.adequacy.whiteness.is_none());
+    let of_verdict = odds(decision.verdict, is_untested) * UNLISTED / (1.0 - UNLISTED);
     let listed = 1.0 / (1.0 + of_verdict);
     let left = best.filter(|_| is_answered).map(|j| &j.adequacy);
     Some(shared(weights, left.map_or(listed, |left| still_listed(listed, left, discrepancy)), discrepancy))
+}
+
+/// How often a verdict falls where the truth is in no list, over how often where it is.
+fn odds(verdict: Verdict, is_untested: bool) -> f64 {
+    let counted = match verdict {
+        Verdict::Named => NAMED,
+        Verdict::Tie => TIED,
+        Verdict::Unexplained => UNEXPLAINED,
+        Verdict::NoGap => 0.0,
+    };
+    if is_untested { counted.max(UNTESTED) } else { counted }
 }
 
 /// The probability that the truth is in the list, with these residuals: where they may hide a gap again, as much of it as is left is in no list.
@@ -183,6 +190,19 @@ mod tests {
                 "20 % of the gap is left"
             ]
         );
+    }
+
+    #[test]
+    fn a_name_that_no_test_of_correlation_could_refuse_is_worth_no_more_than_the_prior() {
+        let listed = |verdict, is_untested| {
+            let of_verdict = odds(verdict, is_untested) * UNLISTED / (1.0 - UNLISTED);
+            1.0 / (1.0 + of_verdict)
+        };
+        for verdict in [Verdict::Named, Verdict::Tie] {
+            assert!((listed(verdict, true) - (1.0 - UNLISTED)).abs() < 1e-12);
+            assert!(listed(verdict, false) > listed(verdict, true));
+        }
+        assert!(listed(Verdict::Unexplained, true) < 0.2, "nothing was named");
     }
 
     #[test]

@@ -165,3 +165,14 @@ fn nothing_to_try(study: &Study, options: &Options, n_all: usize) -> String {
         if n_only == 0 { String::new() } else { format!(", and all but {n_only} in `only`") }
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::names;
+
+    #[test]
+    fn a_name_is_that_of_an_effect_and_of_all_of_its_places_and_of_no_longer_name() {
+        assert!(names("leak", "leak") && names("leak", "leak:h1") && names("leak:h1", "leak:h1"));
+        assert!(!names("leak", "leakage") && !names("leak:h1", "leak:h2") && !names("leak:h1", "leak"));
+    }
+}

@@ -2,6 +2,7 @@
 //!
 //! Next file to read: [`super::words`].
 
+use crate::fit::kind::Kind;
 use crate::judge::verdict::another_form;
 
 /// What explains the gap about equally well. That its exact form is open is another thing than a choice among names.
@@ -18,6 +19,23 @@ pub(super) fn tied(name: &str, subject: &str, tied: &[Vec<String>]) -> String {
             named.join(" or ")
         ),
         (true, false) => format!("{name} or {}: the data cannot tell them apart.", named.join(" or ")),
+    }
+}
+
+/// Why this one of a kind is told first: `better` is what the data support more of its own kind, `last` the least likely kind that is tied.
+pub(super) fn first(name: &str, kind: Kind, better: Option<&str>, last: Option<Kind>) -> String {
+    match (better, last.filter(|last| *last > kind)) {
+        (Some(better), _) => {
+            format!(" `{name}` is told first as the simpler form; the data support `{better}` more.")
+        }
+        (None, Some(last)) => {
+            format!(
+                " `{name}` is told first, since {} are held likelier than {}.",
+                kind.plural(),
+                last.plural()
+            )
+        }
+        (None, None) => String::new(),
     }
 }
 
@@ -40,5 +58,19 @@ mod tests {
             both,
             "drag or lag + gain: the data cannot tell them apart, nor the exact form of the first."
         );
+    }
+
+    #[test]
+    fn what_is_told_first_is_so_for_its_simplicity_or_for_its_kind() {
+        let said = |better, last| first("source", Kind::Generic, better, last);
+        let simpler = " `source` is told first as the simpler form; the data support `threshold` more.";
+        assert_eq!(
+            said(Some("threshold"), Some(Kind::Instrument)),
+            simpler,
+            "what the data say comes before the prior"
+        );
+        assert!(said(None, Some(Kind::Instrument)).contains("are held likelier than"));
+        assert_eq!(said(None, Some(Kind::Generic)), "");
+        assert_eq!(said(None, None), "");
     }
 }

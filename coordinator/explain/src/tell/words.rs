@@ -9,7 +9,7 @@ use starlings_study::posterior;
 
 use super::correlated::{correlated_noise, listed as listed_noise};
 use super::errors::shrinking;
-use super::tie::tied;
+use super::tie::{first, tied};
 use crate::fit::candidate::Candidate;
 use crate::fit::fitted_variant::FittedVariant;
 use crate::fit::kind::Kind;
@@ -169,32 +169,21 @@ fn of_no_field(judged: &JudgedFit<'_>) -> &'static str {
     }
 }
 
-/// That what is told first of a tie is the simplest of its kind, where another one is better supported, or is of the likelier kind; empty where it
-/// is first by the data.
+/// Why what is told first of a tie is: as the simplest of its kind, or by the prior; empty where it is first by the data.
 fn likelier(
     judged: &JudgedFit<'_>,
     decision: &Decision,
     found: &SearchResult<'_>,
     candidates: &[Candidate],
 ) -> String {
-    let told = judged.kinds().first().copied().unwrap_or_default();
+    let name = judged.fit.variant.name();
     let rivals = decision.rivals.iter().map(|i| &found.judged[*i]);
     let best = rivals.max_by(|a, b| a.standing().total_cmp(&b.standing()));
-    if let Some(best) =
-        best.filter(|best| best.standing() > judged.standing() && best.kinds() == judged.kinds())
-    {
-        let (first, supported) = (judged.fit.variant.name(), best.fit.variant.name());
-        return format!(" `{first}` is told first as the simpler form; the data support `{supported}` more.");
-    }
+    let better = best.filter(|best| best.standing() > judged.standing() && best.kinds() == judged.kinds());
+    let told = judged.kinds().first().copied().unwrap_or_default();
     let tied = decision.tied.iter().flatten();
     let kinds = tied.filter_map(|name| candidates.iter().find(|c| c.name() == name)).map(|c| c.kind);
-    kinds.filter(|kind| *kind > told).max().map_or_else(String::new, |other| {
-        let (first, last) = (told.plural(), other.plural());
-        format!(
-            " `{}` is told first, since {first} are held likelier than {last}.",
-            judged.fit.variant.name()
-        )
-    })
+    first(&name, told, better.map(|best| best.fit.variant.name()).as_deref(), kinds.max())
 }
 
 /// Other names of what is named; empty without any.
