@@ -4,7 +4,6 @@
 
 mod common;
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use common::{output, refused, repository, starlings};
@@ -19,9 +18,10 @@ mod hearts;
 mod loop_scheme;
 #[path = "import_command/signals.rs"]
 mod signals;
+#[path = "import_command/table.rs"]
+mod table;
 
-/// Columns by name.
-type Table = BTreeMap<String, Vec<f64>>;
+use table::{Table, at, table};
 
 fn file(path: &str) -> PathBuf {
     repository("tests/import_files").join(path)
@@ -42,27 +42,6 @@ fn predicted(folder: &Path) -> Table {
     let (code, stdout, stderr) = output(starlings().arg("simulate").arg(&study));
     assert_eq!(code, 0, "{stderr}");
     table(&stdout)
-}
-
-fn table(text: &str) -> Table {
-    let mut lines = text.lines();
-    let names: Vec<&str> = lines.next().unwrap().split(',').collect();
-    let mut columns: Vec<Vec<f64>> = vec![Vec::new(); names.len()];
-    for line in lines {
-        for (column, word) in columns.iter_mut().zip(line.split(',')) {
-            column.push(word.parse().unwrap());
-        }
-    }
-    names.into_iter().map(str::to_owned).zip(columns).collect()
-}
-
-/// A column between its rows.
-fn at(table: &Table, name: &str, t: f64) -> f64 {
-    let (times, values) =
-        (&table["time"], table.get(name).unwrap_or_else(|| panic!("no {name} in {:?}", table.keys())));
-    let after = times.partition_point(|time| *time <= t).clamp(1, times.len() - 1);
-    let part = ((t - times[after - 1]) / (times[after] - times[after - 1])).clamp(0.0, 1.0);
-    (1.0 - part).mul_add(values[after - 1], part * values[after])
 }
 
 /// Largest difference relative to the largest value.
@@ -188,53 +167,6 @@ fn blocks_keys_and_values_that_are_not_understood_are_named() {
     std::fs::create_dir(&out).unwrap();
     let path = file("svzerodsolver/steadyFlow_R_R.json");
     refused(starlings().arg("import").arg(path).arg("--out").arg(&out), &["is there already", "--out"]);
-}
-
-/// Places of openBF's results along a vessel, as parts of its cells.
-const PLACES: [(&str, f64); 3] = [("quarter", 0.25), ("mid", 0.5), ("threequarter", 0.75)];
-
-/// A field at a part of the cells of a vessel that begin at `first` and are `theirs` in openBF.
-fn along(found: &Table, field: &str, [first, n, theirs]: [usize; 3], part: f64) -> Vec<f64> {
-    // openBF shows its cell round(M part): the middle of that.
-    let middle = (theirs as f64 * part).round_ties_even() - 0.5;
-    let place = middle / theirs as f64 * n as f64 - 0.5;
-    let (cell, rest) = (place.floor() as usize, place - place.floor());
-    let column = |cell: usize| &found[&format!("{field}[{}]", first + cell)];
-    column(cell).iter().zip(column(cell + 1)).map(|(a, b)| (1.0 - rest).mul_add(*a, rest * b)).collect()
-}
-
-/// Compares, as root mean square relative to the largest value, pressure (Pa) and flow (m³/s) of a vessel with openBF's, in the period after so
-/// many. What they differ by is openBF's grid: `coordinator/draft/tests/openbf_grid.rs`.
-fn compare_vessel(found: &Table, name: &str, [period, before]: [f64; 2], cells: [usize; 3]) {
-    let reference = table(&std::fs::read_to_string(file(&format!("openbf/{name}_reference.csv"))).unwrap());
-    for (field, letter, unit, bound) in [("pressure", "P", 0.1, 2e-3), ("flow_rate", "Q", 1e-6, 5e-3)] {
-        for (place, part) in PLACES {
-            let values: Vec<f64> = along(found, field, cells, part).iter().map(|v| unit * v).collect();
-            let own = Table::from([("time".to_owned(), found["time"].clone()), ("v".to_owned(), values)]);
-            let wanted = &reference[&format!("{letter}_{place}")];
-            let size = wanted.iter().fold(0.0, |size: f64, v| size.max(v.abs()));
-            let square = reference["time"].iter().zip(wanted);
-            let square = square.map(|(t, w)| (at(&own, "v", t - before * period) - w).powi(2)).sum::<f64>();
-            let rms = (square / wanted.len() as f64).sqrt() / size;
-            assert!(rms <= bound, "{name}: {letter} at {place} is off by {rms}");
-        }
-    }
-}
-
-#[test]
-fn a_carotid_and_an_iliac_bifurcation_carry_the_waves_of_openbf() {
-    let folder = TempDir::new().unwrap();
-    let (cca, ibif) = (folder.path().join("cca"), folder.path().join("ibif"));
-    import(&file("openbf/cca.yaml"), &cca);
-    let found = predicted(&cca);
-    compare_vessel(&found, "cca", [found["time"].last().copied().unwrap(), 3.0], [0, 51, 126]);
-    import(&file("openbf/ibif.yaml"), &ibif);
-    let found = predicted(&ibif);
-    let period = found["time"].last().copied().unwrap();
-    for (name, cells) in [("ibif_parent", [0, 35, 86]), ("ibif_d1", [35, 34, 85]), ("ibif_d2", [69, 34, 85])]
-    {
-        compare_vessel(&found, name, [period, 8.0], cells);
-    }
 }
 
 /// A vessel apart from the others.

@@ -4,43 +4,22 @@
 
 #[path = "openbf_grid/scheme.rs"]
 mod scheme;
+#[path = "../../../tests/import_command/table.rs"]
+mod table;
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use scheme::{Given, melis};
 use starlings_draft::import::import;
 use starlings_study::twin::{Twin, simulate};
 use starlings_study::{SolverHost, Study};
-
-/// Columns by name.
-type Table = BTreeMap<String, Vec<f64>>;
+use table::{Table, at, table};
 
 /// Places of openBF's results, as shares of a vessel's cells.
 const PLACES: [(&str, f64); 3] = [("quarter", 0.25), ("mid", 0.5), ("threequarter", 0.75)];
 
 fn file(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/import_files/openbf").join(name)
-}
-
-fn table(text: &str) -> Table {
-    let mut lines = text.lines();
-    let names: Vec<&str> = lines.next().unwrap().split(',').collect();
-    let mut columns: Vec<Vec<f64>> = vec![Vec::new(); names.len()];
-    for line in lines {
-        for (column, word) in columns.iter_mut().zip(line.split(',')) {
-            column.push(word.parse().unwrap());
-        }
-    }
-    names.into_iter().map(str::to_owned).zip(columns).collect()
-}
-
-/// A column between its rows.
-fn at(table: &Table, name: &str, t: f64) -> f64 {
-    let (times, values) = (&table["time"], &table[name]);
-    let after = times.partition_point(|time| *time <= t).clamp(1, times.len() - 1);
-    let part = ((t - times[after - 1]) / (times[after] - times[after - 1])).clamp(0.0, 1.0);
-    (1.0 - part).mul_add(values[after - 1], part * values[after])
 }
 
 /// A field at one of openBF's places: in the middle of its cell round(M part), between two of the study's.
@@ -50,6 +29,14 @@ fn along(found: &Table, field: &str, [first, n, theirs]: [usize; 3], part: f64) 
     let (cell, rest) = (place.floor() as usize, place.fract());
     let column = |cell: usize| &found[&format!("{field}[{}]", first + cell)];
     column(cell).iter().zip(column(cell + 1)).map(|(a, b)| (1.0 - rest).mul_add(*a, rest * b)).collect()
+}
+
+/// A file as a study, in a folder that lasts as long as the first.
+fn imported(name: &str) -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join(name);
+    import(&file(&format!("{name}.yaml")), &out, &SolverHost::default()).unwrap();
+    (folder, out)
 }
 
 /// What the model of an imported study predicts.
@@ -120,9 +107,7 @@ fn in_its_cells(name: &str, given: &[Given], before: f64) {
 /// What the scheme in cells of a half and a quarter of a millimetre, and in the limit of none, is off `artery-1d` in the period
 /// after so many from rest: pressures and flows, at most. At the junction it keeps what the model does, the total pressure.
 fn comes_to_the_model(name: &str, given: &[Given], before: f64, most: [[f64; 3]; 2]) {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join(name);
-    import(&file(&format!("{name}.yaml")), &out, &SolverHost::default()).unwrap();
+    let (_folder, out) = imported(name);
     if before < 1.0 {
         // The study begins with the period whose results openBF has stored.
         let study = std::fs::read_to_string(out.join("study.toml")).unwrap();
@@ -147,6 +132,32 @@ fn comes_to_the_model(name: &str, given: &[Given], before: f64, most: [[f64; 3];
             );
         }
     }
+}
+
+/// What the model is off openBF's stored results, which begin after so many periods: pressures and flows, at most.
+fn carries_the_waves(name: &str, given: &[Given], before: f64) {
+    let (_folder, out) = imported(name);
+    let found = predicted(&out);
+    let start = before * found["time"].last().copied().unwrap();
+    for given in given {
+        let text = std::fs::read_to_string(file(&format!("{}_reference.csv", given.name))).unwrap();
+        let theirs = table(&text);
+        for (field, letter, unit, bound) in [("pressure", "P", 0.1, 2e-3), ("flow_rate", "Q", 1e-6, 5e-3)] {
+            for (place, part) in PLACES {
+                let name = format!("{letter}_{place}");
+                let values = along(&found, field, given.cells, part).iter().map(|v| unit * v).collect();
+                let own = Table::from([("time".to_owned(), found["time"].clone()), (name.clone(), values)]);
+                let off = rms(&theirs, &name, &|i, t| at(&own, &name, t - start) - theirs[&name][i]);
+                assert!(off <= bound, "{}: {name} is off by {off}", given.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_carotid_and_an_iliac_bifurcation_carry_the_waves_of_openbf() {
+    carries_the_waves("cca", &CCA, 3.0);
+    carries_the_waves("ibif", &IBIF, 8.0);
 }
 
 #[test]
