@@ -225,6 +225,17 @@ mod tests {
     }
 
     #[test]
+    fn of_a_change_of_speed_that_two_looks_tell_two_thirds_are_believed() {
+        let mut pace = Pace::default();
+        for k in 0..3 {
+            pace.at(f64::from(k), &of(f64::from(k)));
+        }
+        // Three units in five seconds, the last two in four: 6/5 of the mean, of which the rest of 27 takes 45 s.
+        let told = left(&mut pace, 5.0, &of(3.0));
+        assert!((told - 45.0 * (1.0 + 0.2 * 2.0 / 3.0)).abs() < 1e-9, "{told}");
+    }
+
+    #[test]
     fn workers_that_leave_show_before_as_much_time_has_passed_again() {
         let mut pace = ten();
         let told =
