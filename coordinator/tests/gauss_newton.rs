@@ -2,6 +2,8 @@
 #![allow(clippy::unwrap_used)]
 mod study_kit;
 
+use starlings_coordinator::study::trial::{Depth, dry_run};
+use starlings_estimators::{BATCH, GAUSS_NEWTON};
 use study_kit::{Case, Done, csv, grid, normals, run_once};
 
 /// x'' = −k x − c v − d |v| v, from a start of each record's own: the predictions are not linear in any of them.
@@ -101,6 +103,15 @@ fn an_iteration_makes_one_run_of_each_record() {
 }
 
 #[test]
+fn slopes_that_are_infinite_where_the_outputs_are_not_show_before_the_fit() {
+    // The root of 1 - x moves infinitely fast with x where that is one, as at the start.
+    let case = Case::new(&study("kind = \"gauss-newton\"", "-k*x - c*v - d*sqrt(1 - x)"), &recordings());
+    let error = dry_run(&mut case.study(), &GAUSS_NEWTON, Depth::First).unwrap_err().to_string();
+    assert!(error.contains("with its slopes"), "{error}");
+    assert!(dry_run(&mut case.study(), &BATCH, Depth::First).is_ok());
+}
+
+#[test]
 fn where_there_are_no_derivatives_the_study_is_refused() {
     let refused = |estimator: &str, rate: &str| {
         Case::new(&study(estimator, rate), &recordings()).refusal().expect("a refusal")
@@ -109,7 +120,7 @@ fn where_there_are_no_derivatives_the_study_is_refused() {
     let said = refused(exact, "-k*x - c*v - d*sign(v)");
     assert!(said.contains("rate of `v` jumps") && said.contains("use kind = \"batch\""), "{said}");
     let said = refused(&format!("{exact}\nspread = 0.1"), RATE);
-    assert!(said.contains("`spread` is of sigma points"), "{said}");
+    assert!(said.contains("`spread` belongs to kind = \"batch\""), "{said}");
     let said = refused(&format!("{exact}\npasses = 2"), RATE);
     assert!(said.contains("`passes` belongs to kind = \"roukf\""), "{said}");
 }

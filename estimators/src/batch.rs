@@ -17,7 +17,7 @@ use crate::{Data, EstimatorError, Form, Gaussian, Kind, SigmaSet, Slope};
 /// Iterated sigma-point Gauss-Newton.
 pub static BATCH: Kind = Kind {
     name: "batch",
-    keys: &["max_iterations", "tolerance"],
+    keys: &["points", "kappa", "spread", "max_iterations", "tolerance"],
     spread: 0.1,
     form: Form::WholeRecords(Slope::Points),
 };

@@ -12,7 +12,8 @@ use crate::{Batch, BatchState, Form, Kind, Slope};
 pub static GAUSS_NEWTON: Kind = Kind {
     name: "gauss-newton",
     keys: &["max_iterations", "tolerance"],
-    spread: 0.1,
+    // Of what is found beside the fit by differences, such as identifiability.
+    spread: 0.001,
     form: Form::WholeRecords(Slope::Exact),
 };
 

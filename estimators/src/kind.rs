@@ -11,7 +11,7 @@ use crate::{Drift, EstimatorError, Filter, Points, Root};
 pub struct Kind {
     /// Its `kind` in a study file.
     pub name: &'static str,
-    /// Keys of the section that it reads beside those that all share (`points`, `kappa`, `spread`).
+    /// Keys of the section that it reads.
     pub keys: &'static [&'static str],
     /// Width of its points unless the study says otherwise.
     pub spread: f64,

@@ -16,7 +16,7 @@ use crate::{
 /// The reduced-order unscented Kalman filter.
 pub static ROUKF: Kind = Kind {
     name: "roukf",
-    keys: &["passes", "anneal", "root", "resample"],
+    keys: &["points", "kappa", "spread", "passes", "anneal", "root", "resample"],
     spread: 0.001,
     form: Form::Windows(|o| {
         let set = SigmaSet::new(o.points, o.n_param)?;

@@ -52,11 +52,8 @@ impl Study {
     /// an initial value its own prior median.
     pub fn theta_for(&self, record: usize, transformed: &[f64]) -> Vec<f64> {
         let value = |(index, parameter): (usize, &StudyParameter)| {
-            let entries = self.entries_for(record, index);
-            let sum: f64 = entries.iter().map(|entry| transformed[*entry]).sum();
-            let mean =
-                if entries.is_empty() { parameter.prior_mean[record] } else { sum / entries.len() as f64 };
-            parameter.transform.to_physical(mean)
+            let mean = mean_of(&self.entries_for(record, index), transformed);
+            parameter.transform.to_physical(mean.unwrap_or_else(|| parameter.prior_mean[record]))
         };
         self.parameters.iter().enumerate().map(value).collect()
     }
@@ -66,9 +63,8 @@ impl Study {
         let mut slopes = Vec::new();
         for (index, parameter) in self.parameters.iter().enumerate() {
             let entries = self.entries_for(record, index);
-            let share = 1.0 / entries.len() as f64;
-            let mean: f64 = entries.iter().map(|entry| transformed[*entry]).sum::<f64>() * share;
-            let slope = share * parameter.transform.derivative(mean);
+            let Some(mean) = mean_of(&entries, transformed) else { continue };
+            let slope = parameter.transform.derivative(mean) / entries.len() as f64;
             slopes.extend(entries.into_iter().map(|entry| (index, entry, slope)));
         }
         slopes
@@ -85,4 +81,10 @@ impl Study {
             None => of_parameter.map(|(entry, _)| entry).collect(),
         }
     }
+}
+
+/// The mean of some entries; `None` of none.
+fn mean_of(entries: &[usize], transformed: &[f64]) -> Option<f64> {
+    let sum: f64 = entries.iter().map(|entry| transformed[*entry]).sum();
+    (!entries.is_empty()).then(|| sum / entries.len() as f64)
 }

@@ -59,10 +59,10 @@ impl Study {
         Setup { slopes: true, ..self.setup.clone() }
     }
 
-    /// The window with room for the outputs and their derivatives by every value of a job.
+    /// The window with room for the outputs and their derivatives by every value of a job, and no observed value.
     pub(crate) fn widened(&self, window: &Window) -> Arc<Window> {
-        let n = window.observed.len() * (1 + self.parameters.len());
-        Arc::new(Window { observed: vec![f64::NAN; n], ..window.clone() })
+        let n_obs = self.setup.outputs.len() * (1 + self.parameters.len());
+        Arc::new(Window::free(window.start, window.times.clone(), n_obs, window.inputs.clone()))
     }
 
     /// The window that is asked for where this one is wanted from the record's start: all times of the record where the solver

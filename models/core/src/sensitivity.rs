@@ -9,7 +9,7 @@ use std::array::from_fn;
 use crate::binding::{Binding, Target};
 use crate::integrate::Solver;
 use crate::segment::Drive;
-use crate::slopes::{Direction, LANES, Slopes, Take};
+use crate::slopes::{Direction, LANES, Point, Slopes, Take};
 use crate::{Model, Quantity, SetupError, Spec};
 
 /// A model with its sensitivities. State and outputs of the model come first, then their derivatives by each value in turn.
@@ -113,12 +113,16 @@ impl Model for Sensitive {
 
     fn rhs(&self, t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, dx: &mut [f64]) {
         let n = self.n();
-        self.place(n, x, dx, |slopes, along, take| slopes.rhs(t, &x[..n], theta, u, along, take));
+        self.place(n, x, dx, |slopes, along, take| {
+            slopes.rhs(Point { t, x: &x[..n], theta, u }, along, take);
+        });
     }
 
     fn output(&self, t: f64, x: &[f64], theta: &[f64], u: Drive<'_>, y: &mut [f64]) {
         let (n, n_output) = (self.n(), self.inner.spec().n_output());
-        self.place(n_output, x, y, |slopes, along, take| slopes.output(t, &x[..n], theta, u, along, take));
+        self.place(n_output, x, y, |slopes, along, take| {
+            slopes.output(Point { t, x: &x[..n], theta, u }, along, take);
+        });
     }
 
     fn solver(&self) -> Solver {

@@ -64,43 +64,18 @@ impl Simulator {
         let (outputs, theta) = (&setup.outputs, binding.constants());
         let wiring = Wiring { spec: &spec, outputs, model: &*model, theta, native };
         let observer = observer::build(&setup.observer, wiring)?;
-        if setup.slopes {
-            return Self::sensitive(model, setup, observer, binding, &rows);
-        }
+        let n_state = spec.n_state();
+        let (model, spec, rows) = if setup.slopes {
+            let rows = with_slopes(&rows, binding.len(), model.spec());
+            let model = sensitive(model, setup, &binding)?;
+            let spec = model.spec().clone();
+            (model, spec, rows)
+        } else {
+            (model, spec, rows)
+        };
         let max_steps = setup.max_steps.unwrap_or(MAX_STEPS);
         let timeout = setup.timeout.unwrap_or(TIMEOUT);
-        let n_state = spec.n_state();
         Ok(Self { model, spec, observer, binding, n_state, rows, noise: setup.noise, max_steps, timeout })
-    }
-
-    /// The same for a model with its derivatives: below the given rows, theirs by each value of a job.
-    fn sensitive(
-        model: Box<dyn Model>,
-        setup: &Setup,
-        observer: Box<dyn Observer>,
-        binding: Binding,
-        rows: &[Row],
-    ) -> Result<Self, SetupError> {
-        let refused = [
-            (!setup.observer.is_off(), "under an observer"),
-            (!setup.periods.is_empty(), "from a periodic start"),
-            (setup.noise.is_some(), "with noise"),
-        ];
-        if let Some((_, what)) = refused.into_iter().find(|(is_so, _)| *is_so) {
-            return Err(SetupError::Invalid(format!("derivatives of a run {what} are not to be had")));
-        }
-        let (n_state, n_output) = (model.spec().n_state(), model.spec().n_output());
-        let below = |by: usize| {
-            rows.iter().map(move |row| match *row {
-                Row::Output(i) => Row::Output(by * n_output + i),
-                Row::State(i) => Row::State(by * n_state + i),
-            })
-        };
-        let rows = (0..=binding.len()).flat_map(below).collect();
-        let model: Box<dyn Model> = Box::new(Sensitive::new(model, &binding)?);
-        let (max_steps, timeout) = (setup.max_steps.unwrap_or(MAX_STEPS), setup.timeout.unwrap_or(TIMEOUT));
-        let spec = model.spec().clone();
-        Ok(Self { model, spec, observer, binding, n_state, rows, noise: None, max_steps, timeout })
     }
 
     /// The model's state at the window's start, and the past that led to it.
@@ -224,6 +199,31 @@ impl Simulator {
             format!("the run computed for more than {limit} s (`timeout` in `[model]` sets the limit)");
         Timeout { limit, says }
     }
+}
+
+/// The model with its derivatives by each value of a job.
+fn sensitive(model: Box<dyn Model>, setup: &Setup, binding: &Binding) -> Result<Box<dyn Model>, SetupError> {
+    let refused = [
+        (!setup.observer.is_off(), "under an observer"),
+        (!setup.periods.is_empty(), "from a periodic start"),
+        (setup.noise.is_some(), "with noise"),
+    ];
+    match refused.into_iter().find(|(is_so, _)| *is_so) {
+        Some((_, what)) => Err(SetupError::Invalid(format!("derivatives of a run {what} are not to be had"))),
+        None => Ok(Box::new(Sensitive::new(model, binding)?)),
+    }
+}
+
+/// The rows of a model, and below them those of their derivatives by so many values.
+fn with_slopes(rows: &[Row], n_value: usize, of: &Spec) -> Vec<Row> {
+    let (n_state, n_output) = (of.n_state(), of.n_output());
+    let below = |by: usize| {
+        rows.iter().map(move |row| match *row {
+            Row::Output(i) => Row::Output(by * n_output + i),
+            Row::State(i) => Row::State(by * n_state + i),
+        })
+    };
+    (0..=n_value).flat_map(below).collect()
 }
 
 /// The names that only terms of effects use, so that a constant may have them.

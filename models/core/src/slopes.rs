@@ -22,34 +22,30 @@ pub struct Direction<'a> {
     pub y: &'a [f64],
 }
 
+/// Where derivatives are taken.
+#[derive(Clone, Copy)]
+pub struct Point<'a> {
+    /// Time.
+    pub t: f64,
+    /// States.
+    pub x: &'a [f64],
+    /// Parameters.
+    pub theta: &'a [f64],
+    /// Inputs.
+    pub u: Drive<'a>,
+}
+
 /// Takes the value of a component, by its position, and its derivative along each of the directions.
 pub type Take<'a> = dyn FnMut(usize, f64, &[f64]) + 'a;
 
-/// The equations of a [`crate::Model`] with their derivatives along up to [`LANES`] directions. Arguments are those of the model's methods
-/// of the same names.
+/// The equations of a [`crate::Model`] with their derivatives along up to [`LANES`] directions, by the names of the model's methods.
 pub trait Slopes {
     /// The initial state.
     fn initial(&self, theta: &[f64], along: &[Direction<'_>], take: &mut Take<'_>);
 
     /// The rate of the state.
-    fn rhs(
-        &self,
-        t: f64,
-        x: &[f64],
-        theta: &[f64],
-        u: Drive<'_>,
-        along: &[Direction<'_>],
-        take: &mut Take<'_>,
-    );
+    fn rhs(&self, at: Point<'_>, along: &[Direction<'_>], take: &mut Take<'_>);
 
     /// The outputs.
-    fn output(
-        &self,
-        t: f64,
-        x: &[f64],
-        theta: &[f64],
-        u: Drive<'_>,
-        along: &[Direction<'_>],
-        take: &mut Take<'_>,
-    );
+    fn output(&self, at: Point<'_>, along: &[Direction<'_>], take: &mut Take<'_>);
 }

@@ -193,6 +193,9 @@ fn patience(source: &Source, value: &Spanned<f64>) -> f64 {
 /// Keys that belong to other estimators than the chosen one: they would be ignored silently.
 fn foreign_keys(source: &Source, section: &EstimatorSection, kind: &Kind, once: Option<&Description>) {
     let given = [
+        ("points", section.points.as_ref().map(Spanned::span)),
+        ("kappa", section.kappa.as_ref().map(Spanned::span)),
+        ("spread", section.spread.as_ref().map(Spanned::span)),
         ("passes", section.passes.as_ref().map(Spanned::span)),
         ("anneal", section.anneal.as_ref().map(Spanned::span)),
         ("root", section.root.as_ref().map(Spanned::span)),
@@ -200,19 +203,10 @@ fn foreign_keys(source: &Source, section: &EstimatorSection, kind: &Kind, once: 
         ("max_iterations", section.max_iterations.as_ref().map(Spanned::span)),
         ("tolerance", section.tolerance.as_ref().map(Spanned::span)),
     ];
-    let of_points = [
-        ("points", section.points.as_ref().map(Spanned::span)),
-        ("kappa", section.kappa.as_ref().map(Spanned::span)),
-        ("spread", section.spread.as_ref().map(Spanned::span)),
-    ];
-    for (key, span) in of_points.into_iter().filter(|_| kind.has_exact_slopes()) {
-        if let Some(span) = span {
-            let message = format!("`{key}` is of sigma points, and kind = \"{}\" has none", kind.name);
-            source.report_with(span, message, "remove it, or use kind = \"batch\"");
-        }
-    }
     for (key, span) in given {
-        let owner = KINDS.iter().find(|other| other.keys.contains(&key));
+        // Of several the first that goes through the data in the same way.
+        let owners = KINDS.iter().filter(|other| other.keys.contains(&key));
+        let owner = owners.min_by_key(|other| other.is_filter() != kind.is_filter());
         if let (Some(span), Some(owner), false) = (span, owner, kind.keys.contains(&key)) {
             let help = match once {
                 Some(solver) => {

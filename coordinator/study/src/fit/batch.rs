@@ -61,10 +61,9 @@ pub(crate) fn fit(
         let theta = if exact { points.columns(0, 1).into_owned() } else { points };
         store.keep_points(at.step, &theta)?;
         let results = run_ensemble(runner, &mut now, at, &theta, &windows)?;
-        let (predictions, failed) = if exact {
-            slopes::as_points(study, &batch, &now.estimate.state, &results[0], &windows)
-        } else {
-            gathered(&batch, &results, &windows)
+        let (predictions, failed) = match results.as_slice() {
+            [centre] if exact => slopes::as_points(study, &batch, &now.estimate.state, centre, &windows),
+            _ => gathered(&batch, &results, &windows),
         };
         let (next, step) = batch.step(
             &now.estimate.state,

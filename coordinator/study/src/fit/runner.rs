@@ -240,8 +240,8 @@ impl<'a> EnsembleRunner<'a> {
         window: &Window,
     ) -> Result<(), RunError> {
         let (outputs, state) = (prediction.outputs.len(), prediction.state.n_state());
-        let with_slopes = if self.wants_slopes(at) { 1 + self.study.parameters.len() } else { 1 };
-        let wanted = window.observed.len() * with_slopes;
+        let with_slopes = self.wants_slopes(at).then(|| self.study.widened(window));
+        let wanted = with_slopes.map_or(window.observed.len(), |window| window.observed.len());
         let reason = if outputs != wanted {
             format!("{outputs} predicted values where {wanted} were asked for")
         } else if let Some(wanted) = self.n_state.filter(|n| *n != state) {

@@ -2,7 +2,7 @@
 //!
 //! Next file to read: the `gauss_newton` module of `starlings-estimators`.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, DVectorView};
 use starlings_estimators::{Batch, BatchState};
 
 use super::runner::{Predicted, StepWindows};
@@ -23,25 +23,22 @@ pub(super) fn as_points(
     windows: &StepWindows,
 ) -> (DMatrix<f64>, Vec<bool>) {
     let (m, p) = (windows.iter().map(|(_, w)| w.observed.len()).sum(), study.theta.len());
-    let at = batch.centre(state);
     let (mut centre, mut slope) = (DVector::from_element(m, f64::NAN), DMatrix::zeros(m, p));
+    let (at, n_obs) = (batch.centre(state), study.setup.outputs.len());
     let mut first = 0;
     for ((record, window), result) in windows.iter().zip(results) {
-        let rows = window.observed.len();
-        if let Ok(prediction) = result {
-            let n_obs = rows / window.times.len().max(1);
-            let moves = study.theta_slopes(*record, at.as_slice());
-            let of_time = prediction.outputs.chunks_exact(n_obs * (1 + study.parameters.len()));
-            for (row, values) in (first..).step_by(n_obs.max(1)).zip(of_time) {
-                for i in 0..n_obs {
-                    centre[row + i] = values[i];
-                    for &(value, entry, factor) in &moves {
-                        slope[(row + i, entry)] += values[(1 + value) * n_obs + i] * factor;
-                    }
-                }
+        let moves = study.theta_slopes(*record, at.as_slice());
+        let outputs = result.as_ref().map_or(&[][..], |prediction| &prediction.outputs);
+        for (time, values) in outputs.chunks_exact(n_obs * (1 + study.parameters.len())).enumerate() {
+            let (values, derivatives) = values.split_at(n_obs);
+            let row = first + time * n_obs;
+            centre.rows_mut(row, n_obs).copy_from_slice(values);
+            for &(value, entry, factor) in &moves {
+                let by_value = DVectorView::from_slice(&derivatives[value * n_obs..], n_obs);
+                slope.view_mut((row, entry), (n_obs, 1)).column_mut(0).axpy(factor, &by_value, 1.0);
             }
         }
-        first += rows;
+        first += window.observed.len();
     }
     let failed = results.iter().any(Result::is_err);
     (batch.linear(state, &centre, &slope), vec![failed; batch.set.n_particle() + 1])

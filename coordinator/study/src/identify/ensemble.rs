@@ -46,7 +46,7 @@ pub struct Response {
 
 /// Distance of the points from their centre, in prior sd.
 pub fn spread(study: &Study) -> f64 {
-    if study.estimator.kind.has_exact_slopes() { CLOSEST } else { study.estimator.spread.max(CLOSEST) }
+    study.estimator.spread.max(CLOSEST)
 }
 
 /// Relative accuracy of central differences at this distance: their error is of second order in it.

@@ -20,7 +20,7 @@ pub enum IdentifyError {
     /// The model fails next to the point of the analysis.
     #[error(
         "the model fails on record `{record}` at {place}: {source}; bound the parameter with a logit transform, move its \
-         prior, or set a smaller [estimator] spread"
+         prior, or set a smaller [estimator] spread (kind = \"batch\")"
     )]
     Particle {
         /// Record name.

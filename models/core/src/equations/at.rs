@@ -3,6 +3,7 @@
 //! Next file to read: [`super::expression`].
 
 use crate::segment::Drive;
+use crate::slopes::Point;
 
 pub use crate::slopes::Direction;
 
@@ -34,4 +35,11 @@ pub struct At<'a> {
     pub u: Drive<'a>,
     /// Outputs; may be empty when no name was resolved to one.
     pub y: &'a [f64],
+}
+
+/// Rates and outputs are written out: no name in them is that of an output.
+impl<'a> From<Point<'a>> for At<'a> {
+    fn from(Point { t, x, theta, u }: Point<'a>) -> Self {
+        Self { t, x, theta, u, y: &[] }
+    }
 }

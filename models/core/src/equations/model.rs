@@ -10,7 +10,7 @@ use super::def::EquationsDef;
 use super::program::Programs;
 use crate::integrate::Solver;
 use crate::segment::Drive;
-use crate::slopes::{LANES, Slopes, Take};
+use crate::slopes::{LANES, Point, Slopes, Take};
 use crate::{Memory, Model, SetupError, Spec};
 
 /// A model whose equations a study states.
@@ -160,28 +160,12 @@ impl Slopes for EquationsModel {
         hand_on(&self.built.initial, &At { t: 0.0, x: &[], theta, u: Drive::NONE, y: &[] }, along, take);
     }
 
-    fn rhs(
-        &self,
-        t: f64,
-        x: &[f64],
-        theta: &[f64],
-        u: Drive<'_>,
-        along: &[Direction<'_>],
-        take: &mut Take<'_>,
-    ) {
-        hand_on(&self.built.rates, &At { t, x, theta, u, y: &[] }, along, take);
+    fn rhs(&self, at: Point<'_>, along: &[Direction<'_>], take: &mut Take<'_>) {
+        hand_on(&self.built.rates, &at.into(), along, take);
     }
 
-    fn output(
-        &self,
-        t: f64,
-        x: &[f64],
-        theta: &[f64],
-        u: Drive<'_>,
-        along: &[Direction<'_>],
-        take: &mut Take<'_>,
-    ) {
-        hand_on(&self.built.outputs, &At { t, x, theta, u, y: &[] }, along, take);
+    fn output(&self, at: Point<'_>, along: &[Direction<'_>], take: &mut Take<'_>) {
+        hand_on(&self.built.outputs, &at.into(), along, take);
     }
 }
 
