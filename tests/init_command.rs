@@ -152,6 +152,21 @@ fn a_table_of_blanks_without_names_is_taken_and_its_columns_are_called_by_number
 }
 
 #[test]
+fn a_column_that_numbers_the_rows_is_neither_measured_nor_the_time_where_there_is_another() {
+    let table = "rownames,t,T\n".to_owned() + &rows(30, |k, _, v| format!("{},{k},{v:.3}", k + 1));
+    let (study, notes) = drafted(folder("a.csv", table).path(), &["a.csv"]);
+    assert!(notes.contains("column `rownames` numbers the rows"), "{notes}");
+    assert!(study.contains("time = \"t\"") && !study.contains("rownames\","), "{study}");
+    let table = ",age,T\n".to_owned() + &rows(30, |k, _, v| format!("{},{},{v:.3}", k + 1, 2 * k));
+    let (study, _) = drafted(folder("b.csv", table).path(), &["b.csv"]);
+    assert!(study.contains("time = \"age\""), "{study}");
+    // Alone it counts the samples.
+    let table = ",T\n".to_owned() + &rows(30, |k, _, v| format!("{k},{v:.3}"));
+    let (study, _) = drafted(folder("c.csv", table).path(), &["c.csv"]);
+    assert!(study.contains("output = \"T\""), "{study}");
+}
+
+#[test]
 fn what_cannot_be_known_is_said_with_the_option_that_says_it() {
     // The first column does not increase, and none is called time.
     let table = "a,b\n".to_owned() + &rows(30, |k, p, v| format!("{},{v:.3}", p + (k % 3) as f64));

@@ -13,6 +13,7 @@ mod model;
 pub(super) mod predict;
 mod quantity;
 pub(super) mod read;
+mod roles;
 mod settings;
 pub(super) mod solver;
 pub(super) mod spectrum;
@@ -117,7 +118,8 @@ pub(super) struct QuantitySection {
 pub(super) struct StateSection {
     pub(super) name: Spanned<String>,
     pub(super) unit: String,
-    pub(super) role: Role,
+    /// As it is written or told by the unit and the rates.
+    pub(super) role: Option<Role>,
     /// A number or an expression, as text.
     pub(super) initial: Spanned<String>,
     /// Terms of the rate by name; a single text has the empty name.

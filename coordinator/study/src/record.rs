@@ -5,6 +5,7 @@
 mod channel;
 mod csv;
 mod derived;
+pub(super) mod found_noise;
 #[cfg(fuzzing)]
 pub(crate) mod fuzzing;
 mod input;
@@ -31,6 +32,7 @@ use super::field::field_of;
 use super::file::RecordSection;
 use super::problem::{Source, suggestion};
 pub(super) use crate::record::csv::Csv;
+use crate::record::found_noise::FoundNoise;
 use crate::record::input::inputs;
 pub(super) use crate::record::pooled_noise::pool_short_records;
 use crate::record::reader::ChannelReader;
@@ -234,6 +236,8 @@ pub(super) struct Context<'a> {
     pub(super) hold_out: &'a [String],
     /// What is doubtful but no error.
     pub(super) warnings: &'a mut Vec<String>,
+    /// Noise that the study left to be found.
+    pub(super) found_noise: Vec<FoundNoise>,
 }
 
 impl Context<'_> {

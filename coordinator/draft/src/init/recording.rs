@@ -11,6 +11,9 @@ use super::sheet::{Sheet, sheet};
 use super::{Ask, Question};
 use crate::names::Names;
 
+/// Headings under which tables of R and pandas number their rows.
+const ROW_NUMBERS: [&str; 8] = ["", "X", "rownames", "row", "Row", "index", "Index", "Unnamed: 0"];
+
 /// What one file holds.
 #[derive(Debug)]
 pub(super) struct Recording {
@@ -155,6 +158,15 @@ impl Times {
     }
 }
 
+/// Whether a column does nothing but number the rows, as tables of R and pandas are written.
+fn numbers_rows(sheet: &Sheet, at: usize) -> bool {
+    let is_named = ROW_NUMBERS.contains(&sheet.headers[at].trim());
+    let cells = || sheet.rows.iter().map(|row| number(&row[at]));
+    let start = cells().next().flatten().filter(|start| [0.0, 1.0].contains(start));
+    is_named
+        && start.is_some_and(|start| cells().enumerate().all(|(row, cell)| cell == Some(start + row as f64)))
+}
+
 /// The column of the times: as it was asked for, by its name, or the first that increases.
 fn time_column(sheet: &Sheet, wish: Option<&str>, ask: Ask<'_>) -> Result<usize, String> {
     let names: Vec<String> = sheet.headers.iter().map(|heading| name_and_unit(heading).0).collect();
@@ -179,7 +191,9 @@ fn time_column(sheet: &Sheet, wish: Option<&str>, ask: Ask<'_>) -> Result<usize,
             })
     };
     let columns = 0..names.len();
-    let found = columns.clone().find(is_date).or_else(|| columns.clone().next().filter(increases));
+    let first = columns.clone().find(|at| !numbers_rows(sheet, *at)).filter(increases);
+    let rows = || columns.clone().find(|at| numbers_rows(sheet, *at));
+    let found = columns.clone().find(is_date).or(first).or_else(rows);
     if let Some(at) = found {
         return Ok(at);
     }
@@ -278,6 +292,10 @@ fn columns(sheet: &Sheet, skipped: &[usize], notes: &mut Vec<String>) -> Vec<(us
         let n_number = values.iter().filter(|value| value.is_finite()).count();
         let n_text = cells().filter(|cell| number(cell).is_none() && !is_missing(cell)).count();
         let heading = &sheet.headers[at];
+        if numbers_rows(sheet, at) {
+            notes.push(format!("column `{heading}` numbers the rows and was left out"));
+            continue;
+        }
         if n_number <= n_text {
             let what = if n_text == 0 { "no value" } else { "texts" };
             notes.push(format!("column `{heading}` holds {what} and was left out"));

@@ -45,6 +45,12 @@ fn write_all(text: &mut String, parts: &Parts, noise: Noise) -> Result {
         text,
         "\n# What is unknown, and what is known of it: `factor` is one standard deviation as a factor on the value, `sd` one in its unit."
     )?;
+    if parts.records.len() > 1 {
+        writeln!(
+            text,
+            "# `per_record = true` gives a parameter a value of its own in every record; the others have one for all."
+        )?;
+    }
     parts.unknown.iter().try_for_each(|unknown| parameter(text, unknown))?;
     parts.records.iter().try_for_each(|part| record(text, part, noise))?;
     if parts.batch {

@@ -116,6 +116,16 @@ pub(crate) fn another_form(name: &str) -> String {
     format!("another form of {name}")
 }
 
+/// What stands for the forms that a term takes where a parameter inside it becomes small or large.
+pub(crate) fn at_a_limit(name: &str, parameter: &str) -> String {
+    format!("{name} at a limit of {parameter}")
+}
+
+/// The parameter of [`at_a_limit`].
+pub(crate) fn parameter_at_limit(form: &str) -> Option<&str> {
+    form.split_once(" at a limit of ").map(|(_, parameter)| parameter)
+}
+
 /// What is told of a class. What was the best takes its place among the rivals.
 fn shown(found: &SearchResult<'_>, best: usize, rivals: &mut [usize]) -> usize {
     let class: Vec<usize> = std::iter::once(best).chain(rivals.iter().copied()).collect();
@@ -190,7 +200,7 @@ pub(crate) fn limits(judged: &JudgedFit<'_>) -> Vec<String> {
             // z counts in prior sd.
             let sd = (optimum.covariance()[(j, j)].max(0.0) * judged.inflation).sqrt();
             if sd > UNINFORMED {
-                limits.push(format!("{} at a limit of {}", effect.candidate.name(), parameter.name));
+                limits.push(at_a_limit(effect.candidate.name(), &parameter.name));
             }
         }
     }

@@ -98,6 +98,24 @@ pub(crate) fn sentence(study: &Study, candidates: &[Candidate]) -> String {
     format!("No candidate adds a term to the {equations} of {names}{why}; {remedy}.")
 }
 
+/// That no state of the equations has a role from which effects of the library grow, with the families that found no place for it.
+pub(crate) fn without_roles(study: &Study) -> Option<String> {
+    if study.explain.library == Library::Study || study.setup.model.equations.is_none() {
+        return None;
+    }
+    let bare = Setup { model: study.setup.model.clone(), ..Setup::default() };
+    let spec = bare.spec().ok().filter(|spec| spec.states.iter().all(|q| q.role == Role::Other))?;
+    let without = FAMILIES.iter().filter(|family| family.grow(&spec, &study.time_unit).is_empty());
+    let without: Vec<&str> = without.map(|family| family.name).collect();
+    (!without.is_empty()).then(|| {
+        format!(
+            "no state has a role, nor a unit that tells it: effects of the families {} found no place, and what was tried of the \
+             library are errors of instruments and terms of no particular physics; give `role` in [[model.states]]",
+            joined(&without)
+        )
+    })
+}
+
 /// Names joined by commas and an `and`.
 fn joined(names: &[&str]) -> String {
     match names {

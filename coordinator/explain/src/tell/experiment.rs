@@ -21,6 +21,8 @@ use crate::run_cache::RunCache;
 const NEW_CHANNEL: f64 = 0.03;
 /// Difference in χ² up to which a verdict can call two variants tied.
 const SEPARATED: f64 = 12.0;
+/// Difference of two courses that are one quantity, as a share of its spread.
+const SAME: f64 = 1e-9;
 /// Factor on the swing of an input, and its inverse.
 const HARDER: f64 = 2.0;
 
@@ -87,7 +89,9 @@ fn trials(study: &Study, record: usize, tracks: &[Track]) -> Vec<Trial> {
         measured: measured.to_vec(),
     };
     let mut list = vec![trial(String::new(), as_it_was.clone(), &measured)];
-    for track in tracks.iter().filter(|t| is_new(study, &measured, &t.name)) {
+    let is_input = |track: &&Track| study.spec.inputs.iter().any(|input| input.name == track.name);
+    let known: Vec<&Track> = tracks.iter().filter(|t| channels.iter().any(|c| c.output == t.name)).collect();
+    for track in tracks.iter().filter(|t| !is_input(t) && !is_measured(t, &known, record)) {
         let noise = NEW_CHANNEL * spread(&track.values[record]);
         if noise > 0.0 {
             let with = [measured.as_slice(), &[(track.name.clone(), noise)]].concat();
@@ -115,8 +119,13 @@ fn trials(study: &Study, record: usize, tracks: &[Track]) -> Vec<Trial> {
     list
 }
 
-fn is_new(study: &Study, measured: &[(String, f64)], name: &str) -> bool {
-    !measured.iter().any(|(known, _)| known == name) && !study.spec.inputs.iter().any(|q| q.name == name)
+/// Whether a record holds the course of a quantity: by its name, or as an output that is nothing but it.
+fn is_measured(track: &Track, known: &[&Track], record: usize) -> bool {
+    known.iter().any(|measured| {
+        let (own, other) = (&track.values[record], &measured.values[record]);
+        let apart = own.iter().zip(other).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        measured.name == track.name || apart <= SAME * spread(other)
+    })
 }
 
 fn spread(values: &[f64]) -> f64 {
@@ -206,6 +215,18 @@ fn separations(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_state_that_an_output_shows_as_it_is_needs_no_channel_of_its_own() {
+        let track = |name: &str, scale: f64| Track {
+            name: name.to_owned(),
+            unit: String::new(),
+            values: vec![(0..5).map(|k| scale * f64::from(k)).collect()],
+        };
+        let (output, state, speed) = (track("position", 1.0), track("x", 1.0), track("v", 1.001));
+        let found = |t: &Track| is_measured(t, &[&output], 0);
+        assert!(found(&output) && found(&state) && !found(&speed));
+    }
 
     #[test]
     fn a_record_twice_as_long_repeats_its_inputs_from_its_start_on_and_time_never_goes_back() {

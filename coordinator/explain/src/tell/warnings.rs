@@ -8,6 +8,7 @@ use starlings_study::Study;
 use super::correlated;
 use crate::fit::candidate::Candidate;
 use crate::fit::fitted_variant::FittedVariant;
+use crate::fit::kind::Kind;
 use crate::judge::adequacy::Nature;
 use crate::judge::contribution::DISCREPANT;
 use crate::judge::gates::JudgedFit;
@@ -17,6 +18,7 @@ use crate::judge::verdict::{Decision, Verdict};
 use crate::number::times;
 use crate::rows::Usage;
 use crate::run_cache::RunCache;
+use crate::screen::not_tried;
 
 /// Distance in noise sd within which two simulated values are the same.
 const SAME: f64 = 0.01;
@@ -78,6 +80,13 @@ fn still_failing(judged: &JudgedFit<'_>) -> Option<String> {
     })
 }
 
+/// Whether there is a gap and no effect of a field explains it.
+fn is_without_physics(found: &SearchResult<'_>, decision: &Decision) -> bool {
+    let told = decision.best.filter(|_| matches!(decision.verdict, Verdict::Named | Verdict::Tie));
+    let of_fields = |i: usize| found.judged[i].kinds().into_iter().all(Kind::is_of_a_field);
+    decision.verdict != Verdict::NoGap && !told.is_some_and(of_fields)
+}
+
 /// What is doubtful in the candidates that were tried.
 pub(crate) fn of_candidates(study: &Study, candidates: &[Candidate]) -> Vec<String> {
     let is_tried = |name: &String| candidates.iter().any(|candidate| candidate.name() == name);
@@ -115,6 +124,9 @@ pub(crate) fn warnings(cache: &RunCache<'_>, found: &SearchResult<'_>, decision:
             "check the noise: the residuals of the model as it is are {} the stated one",
             times(found.adequacy.rmse_over_noise)
         ));
+    }
+    if is_without_physics(found, decision) {
+        list.extend(not_tried::without_roles(cache.study));
     }
     if decision.verdict == Verdict::Unexplained {
         list.extend(correlated::larger(cache.study, &cache.rows, &found.base.predicted));

@@ -26,11 +26,32 @@ use crate::screen::not_tried;
 /// Share of the gap below which what is left is not spoken of: with one digit it would read as nothing.
 const LITTLE: f64 = 5e-4;
 
+/// Correlation from which on two parameters stand in for each other.
+const EXCHANGED: f64 = 0.98;
+
 /// Where a fit stands that has not converged.
 pub(crate) fn stand(fit: &FittedVariant<'_>) -> String {
     let n = fit.residual().len().max(1) as f64;
     let rms = (fit.residual().norm_squared() / n).sqrt();
-    format!("{} (root mean square residual {} noise sd)", values(fit), factor(rms))
+    format!("{} (root mean square residual {} noise sd){}", values(fit), factor(rms), exchanged(fit))
+}
+
+/// The two parameters that stand in for each other most, where they do.
+fn exchanged(fit: &FittedVariant<'_>) -> String {
+    let Ok(optimum) = fit.optimum() else { return String::new() };
+    let covariance = optimum.covariance();
+    let theta = &fit.variant.study.theta;
+    let pairs = (0..covariance.nrows()).flat_map(|j| (0..j).map(move |i| (i, j)));
+    let correlated = pairs.map(|(i, j)| {
+        let value = covariance[(i, j)] / (covariance[(i, i)] * covariance[(j, j)]).sqrt();
+        (i, j, value)
+    });
+    let most = correlated.filter(|(_, _, value)| value.abs() > EXCHANGED);
+    let Some((i, j, value)) = most.max_by(|a, b| a.2.abs().total_cmp(&b.2.abs())) else { return String::new() };
+    format!(
+        ", where {} and {} stand in for each other (correlation {value:.4}): fix one or give it a narrower prior",
+        theta[i].name, theta[j].name
+    )
 }
 
 /// The posterior's names and values in words, for a fit that has not converged.

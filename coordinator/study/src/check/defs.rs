@@ -43,7 +43,7 @@ fn state(section: &StateSection) -> StateDef {
     StateDef {
         name: name.clone(),
         unit: section.unit.clone(),
-        role: section.role,
+        role: section.role.unwrap_or_default(),
         initial: section.initial.get_ref().clone(),
         rate: section.rate.iter().map(term).collect(),
         noise: section.noise.iter().map(term).collect(),

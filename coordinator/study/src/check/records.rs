@@ -8,7 +8,7 @@ use crate::expand::INITIAL;
 use crate::field::field_of;
 use crate::file::{RecordSection, StudyFile};
 use crate::problem::Source;
-use crate::record::{Context, Recordings, pool_short_records};
+use crate::record::{Context, Recordings, found_noise, pool_short_records};
 
 /// Reads all records; their outputs become those of the setup.
 pub(super) fn records(
@@ -20,10 +20,12 @@ pub(super) fn records(
 ) -> Vec<Record> {
     check_record_list(source, file);
     let mut files = Recordings::new(source);
-    let mut context = Context { outputs: &mut model.setup.outputs, hold_out, warnings };
+    let mut context =
+        Context { outputs: &mut model.setup.outputs, hold_out, warnings, found_noise: Vec::new() };
     let read = |section: &RecordSection| files.record(section, &model.spec, &mut context);
     let mut records: Vec<Record> = file.records.iter().filter_map(read).collect();
-    pool_short_records(&mut records, context.warnings);
+    pool_short_records(&mut records, &mut context.found_noise);
+    context.warnings.extend(found_noise::warnings(&context.found_noise));
     check_held_out_components(source, file, &records);
     records
 }

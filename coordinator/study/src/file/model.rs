@@ -9,6 +9,7 @@ use toml::Spanned;
 
 use super::layout::Layout;
 use super::quantity::{named_role, role, unit};
+use super::roles::told_by_rates;
 use super::solver::{self, program};
 use super::table::{Node, Table, named_texts, number, text, wrong_type};
 use super::{
@@ -104,8 +105,10 @@ fn equations(source: &Source, model: &Table<'_>) -> EquationsSection {
     if model.get("outputs").is_none() {
         model.missing("outputs", "such as `[ { name = \"position\", unit = \"m\", value = \"x\" } ]`");
     }
+    let mut states: Vec<StateSection> = states.iter().map(|t| state(source, t)).collect();
+    told_by_rates(&mut states);
     EquationsSection {
-        states: states.iter().map(|t| state(source, t)).collect(),
+        states,
         outputs: quantities(source, model, "outputs", "an output", true),
         inputs: quantities(source, model, "inputs", "an input", false),
         replaceable: model.texts("replaceable"),
@@ -126,7 +129,7 @@ fn quantities(
     let read = |t: Table<'_>| QuantitySection {
         name: t.required_text("name", "how other parts of the study call it"),
         unit: unit(&t),
-        role: role(source, &t),
+        role: role(source, &t).unwrap_or_default(),
         value: if with_value {
             t.required_text("value", "an expression such as \"x\"")
         } else {

@@ -220,7 +220,7 @@ fn quantities(source: &Source, model: &Table<'_>, key: &str, keys: &[&str]) -> V
         ProgramQuantity {
             name: t.required_text("name", "how the study and the program call it"),
             unit: unit(&t),
-            role: role(source, &t),
+            role: role(source, &t).unwrap_or_default(),
             default: t.number("default"),
             range: t.interval("range"),
             size: t.count("size"),

@@ -6,6 +6,7 @@ use starlings_models::units::{rounded, spaced};
 
 use super::Context;
 use super::derived::Derived;
+use super::found_noise::FoundNoise;
 use super::noise::Noise;
 use super::part::Part;
 use super::reader::{ChannelReader, measured_somewhere};
@@ -65,7 +66,7 @@ impl ChannelReader<'_> {
         let columns: Vec<&[f64]> = measured.iter().map(|(values, _)| values.as_slice()).collect();
         let label = written.as_deref().unwrap_or(&quantity.unit);
         let found = self.noise(section, &columns, label)?;
-        context.warnings.extend(self.noise_warning(section, &found, label));
+        context.found_noise.extend(self.found_noise(section, &found, label));
         let noise = self.derived_noise(derived, &columns, found);
         context.warnings.extend(self.derived_warning(section, derived, &noise, &quantity.unit));
         // A unit belongs to the column; what is derived from it is in the output's.
@@ -100,17 +101,14 @@ impl ChannelReader<'_> {
         })
     }
 
-    /// The warning about a noise that the study does not give.
-    fn noise_warning(&self, section: &ChannelSection, noise: &Noise, label: &str) -> Option<String> {
-        noise.how.starts_with("from").then(|| {
-            format!(
-                "the noise of `{}` in record `{}` was not given: {} was found {}. Give the sensor's standard \
-                 deviation if it is known.",
-                section.output.get_ref(),
-                self.name(),
-                with_unit(noise.sd, label),
-                noise.how
-            )
+    /// A noise that the study does not give.
+    fn found_noise(&self, section: &ChannelSection, noise: &Noise, label: &str) -> Option<FoundNoise> {
+        noise.how.starts_with("from").then(|| FoundNoise {
+            output: section.output.get_ref().clone(),
+            record: self.name().to_owned(),
+            sd: noise.sd,
+            unit: label.to_owned(),
+            how: noise.how.clone(),
         })
     }
 

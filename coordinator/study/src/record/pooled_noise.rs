@@ -4,7 +4,7 @@
 
 use starlings_estimators::{n_third_difference, noise_from_third_differences};
 
-use super::channel::with_unit;
+use super::found_noise::FoundNoise;
 use crate::checked::{Channel, Record};
 
 /// Third differences from which a record tells its noise alone: their median scatters by a fifth then, and by more with fewer.
@@ -13,8 +13,8 @@ const ENOUGH: usize = 50;
 pub(super) const FOUND: &str = "from the third differences of its ";
 
 /// Gives the channels of short records, where the study leaves their noise to be found, the noise that all records of that output tell
-/// together; warnings that speak of it follow. A record that is held out tells nothing of another one's noise.
-pub(crate) fn pool_short_records(records: &mut [Record], warnings: &mut [String]) {
+/// together; what is told of it follows. A record that is held out tells nothing of another one's noise.
+pub(crate) fn pool_short_records(records: &mut [Record], found: &mut [FoundNoise]) {
     let is_found = |channel: &Channel| channel.noise_how.starts_with(FOUND);
     let mut pooled: Vec<(usize, usize, f64, String, usize)> = Vec::new();
     for (r, record) in records.iter().enumerate() {
@@ -46,16 +46,9 @@ pub(crate) fn pool_short_records(records: &mut [Record], warnings: &mut [String]
     for (r, c, sd, how, n_difference) in pooled {
         let Record { name, channels, .. } = &mut records[r];
         let channel = &mut channels[c];
-        let about = format!("the noise of `{}` in record `{name}` was not given", channel.output);
-        for warning in warnings.iter_mut().filter(|warning| warning.starts_with(&about)) {
-            let (before, after) = (with_unit(channel.noise, ""), with_unit(sd, ""));
-            let (Some(unit), Some((_, rest))) =
-                (warning.split_once(&before), warning.split_once(&channel.noise_how))
-            else {
-                continue;
-            };
-            let unit = unit.1.split_once(" was found").map_or("", |(unit, _)| unit);
-            *warning = format!("{about}: {after}{unit} was found {how}{rest}");
+        let told = |f: &&mut FoundNoise| f.record == *name && f.output == channel.output;
+        for told in found.iter_mut().filter(told) {
+            (told.sd, told.how) = (sd, how.clone());
         }
         (channel.noise, channel.noise_how, channel.noise_found_from) = (sd, how, Some(n_difference));
     }

@@ -128,11 +128,12 @@ pub(super) fn free_run(fit: &Fit, study: &Study, predictions: &[PredictionRow]) 
         .norm_squared();
     let excess = misfit + far - fit.nis;
     let rms = |sum: f64| (sum.max(0.0) / f64::from(n.max(1))).sqrt();
+    let cure = if study.passes().is_some() { "Leave out [estimator] passes, or use" } else { "Use" };
     (excess > OFF.max(ROUNDING * misfit)).then(|| {
         format!(
             "a free run with the estimate misses the training data by {:.2} times the noise, the filter by {:.2}, which puts \
              the estimate about {:.0} posterior standard deviations from the best one: the filter's states are no trajectory of \
-             its estimate. Leave out [estimator] passes, or use kind = \"batch\".",
+             its estimate. {cure} kind = \"batch\".",
             rms(misfit),
             rms(misfit - excess),
             excess.sqrt()
