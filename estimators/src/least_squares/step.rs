@@ -16,6 +16,15 @@ const LEFT: f64 = 1.0 / 3.0;
 /// Times that a step without a promise is halved.
 const MOST_HALVINGS: usize = 6;
 
+/// Solves for the free components, given what is left of the residual.
+type Solve<'a> = dyn Fn(&[usize], &DVector<f64>) -> Option<DVector<f64>> + 'a;
+
+/// A step, and whether it is as long as the linear model would have it.
+struct Found {
+    step: DVector<f64>,
+    is_whole: bool,
+}
+
 impl LeastSquares {
     /// The damped step within the bounds; notes the fall of the cost that it predicts. Components at a bound that pull outwards
     /// are left where they are, and those that move no residual go to their prior mean last: a parameter inside a term whose
@@ -29,8 +38,7 @@ impl LeastSquares {
         Some(step)
     }
 
-    /// The step of the components that may move, whose columns have these squares. The first of them that would pass an end of its range
-    /// stops there, and the others are solved for anew: cutting all of them off could make a step that leads uphill.
+    /// The step of the components that may move, whose columns have these squares.
     fn step_of(&mut self, felt: &DVector<f64>, moves: &dyn Fn(usize) -> bool) -> Option<DVector<f64>> {
         let p = self.z.len();
         let precision = &self.prior.precision;
@@ -42,29 +50,18 @@ impl LeastSquares {
             let [lo, hi] = self.prior.bounds[j];
             (self.z[j] <= lo && gradient[j] < 0.0) || (self.z[j] >= hi && gradient[j] > 0.0)
         };
-        let mut free: Vec<usize> = (0..p).filter(|j| moves(*j) && !held(*j) && curvature[*j] > 0.0).collect();
-        let mut stopped = DVector::zeros(p);
-        let mut is_whole = true;
-        let step = loop {
-            let left = &self.residual - self.jacobian.times(&stopped);
-            let solved = damped::solve(self, &free, &left, &pull, &curvature)?;
-            let shrink = (LONGEST / solved.amax().max(f64::MIN_POSITIVE)).min(1.0);
-            let mut step = stopped.clone();
-            for (k, j) in free.iter().enumerate() {
-                step[*j] = solved[k] * shrink;
-            }
-            let Some((k, end)) = self.first_stop(&free, &step) else {
-                is_whole &= shrink >= 1.0;
-                break step;
-            };
-            is_whole &= end > self.shortest(free[k]);
-            stopped[free.remove(k)] = end;
-        };
+        let free: Vec<usize> = (0..p).filter(|j| moves(*j) && !held(*j) && curvature[*j] > 0.0).collect();
         let promise = |step: &DVector<f64>| {
             let of_prior = self.prior.cost(&self.z) - self.prior.cost(&self.led(step));
             2.0 * of_data.dot(step) - self.jacobian.times(step).norm_squared() + of_prior
         };
-        let mut step = step;
+        let solve = |free: &[usize], left: &DVector<f64>| damped::solve(self, free, left, &pull, &curvature);
+        let mut found = self.stopped(&free, &solve)?;
+        if promise(&found.step) <= 0.0 {
+            // What one component loses at its end others cannot always make up for; the way to the minimum without ends leads downhill.
+            found = self.cut(&free, &solve(&free, &self.residual)?);
+        }
+        let Found { mut step, mut is_whole } = found;
         let mut predicted = promise(&step);
         // The prior of what grows exponentially is no parabola along a step: a shorter one may lower its cost where the whole does not.
         for _ in 0..MOST_HALVINGS {
@@ -79,6 +76,39 @@ impl LeastSquares {
         self.length = curvature.component_mul(&step).dot(&step).sqrt();
         self.is_whole = is_whole && self.length < damped::USED * self.radius;
         Some(step)
+    }
+
+    /// The step on which components that would pass an end of their range stop there, one after the other, and the others are solved for anew:
+    /// cutting all of them off could make a step that leads uphill.
+    fn stopped(&self, free: &[usize], solve: &Solve<'_>) -> Option<Found> {
+        let mut free = free.to_vec();
+        let mut stopped = DVector::zeros(self.z.len());
+        let mut is_whole = true;
+        loop {
+            let solved = solve(&free, &(&self.residual - self.jacobian.times(&stopped)))?;
+            let mut step = stopped.clone();
+            for (k, j) in free.iter().enumerate() {
+                step[*j] = solved[k];
+            }
+            let shrink = (LONGEST / solved.amax().max(f64::MIN_POSITIVE)).min(1.0);
+            let Some((k, end)) = self.first_stop(&free, &(&step * shrink)) else {
+                // All of it is shortened alike: what stopped and what makes up for it belong together.
+                return Some(Found { step: step * shrink, is_whole: is_whole && shrink >= 1.0 });
+            };
+            is_whole &= end > self.shortest(free[k]);
+            stopped[free.remove(k)] = end;
+        }
+    }
+
+    /// The way to the minimum as far as the first end of a range, or the longest step.
+    fn cut(&self, free: &[usize], solved: &DVector<f64>) -> Found {
+        let mut step = DVector::zeros(self.z.len());
+        for (k, j) in free.iter().enumerate() {
+            step[*j] = solved[k];
+        }
+        let stop = self.first_stop(free, &step).map_or(1.0, |(k, end)| (end / step[free[k]]).abs());
+        let share = stop.min(LONGEST / solved.amax().max(f64::MIN_POSITIVE));
+        Found { step: step * share, is_whole: share >= 1.0 }
     }
 
     /// The place among the free components of the one that a step takes to an end of its range first, and its step to that end.

@@ -47,7 +47,9 @@ fn exchanged(fit: &FittedVariant<'_>) -> String {
         (i, j, value)
     });
     let most = correlated.filter(|(_, _, value)| value.abs() > EXCHANGED);
-    let Some((i, j, value)) = most.max_by(|a, b| a.2.abs().total_cmp(&b.2.abs())) else { return String::new() };
+    let Some((i, j, value)) = most.max_by(|a, b| a.2.abs().total_cmp(&b.2.abs())) else {
+        return String::new();
+    };
     format!(
         ", where {} and {} stand in for each other (correlation {value:.4}): fix one or give it a narrower prior",
         theta[i].name, theta[j].name
