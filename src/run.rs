@@ -22,6 +22,9 @@ use crate::load::{is_outside, load_where};
 use crate::progress::Display;
 use crate::run_folder;
 
+/// Times the sd as wide as which the quarter of an interval, about one sd of a normal distribution, tells the digits of its ends.
+const FAR_WIDER: f64 = 10.0;
+
 /// At most this many constants are told on the terminal.
 const TOLD: usize = 3;
 
@@ -154,7 +157,7 @@ fn estimates(summary: &Summary) -> Vec<Vec<String>> {
         if both { &["95 % given the residuals", "95 % at the stated noise"] } else { &["95 % interval"] };
     let head = ["parameter", "unit", "estimate"].iter().chain(intervals).chain(&["prior median"]);
     let mut rows = vec![head.map(|title| (*title).to_owned()).collect::<Vec<_>>()];
-    let text = |[lo, hi]: [f64; 2], sd| format!("{} … {}", number(lo, Some(sd)), number(hi, Some(sd)));
+    let text = |ends: [f64; 2], sd| format!("{} … {}", end(ends[0], ends, sd), end(ends[1], ends, sd));
     for p in &summary.parameters {
         let given = p.interval95_given_residuals.zip(p.sd_given_residuals).filter(|_| both);
         let sd = given.map_or(p.sd, |(_, sd)| sd);
@@ -165,6 +168,13 @@ fn estimates(summary: &Summary) -> Vec<Vec<String>> {
         rows.push(row);
     }
     rows
+}
+
+/// An end of an interval, with the digits that the sd justifies, or those of its width where that is far more than any number of them: the ends
+/// of a logarithm that is not known have no digits in the units of the sd at the estimate.
+fn end(value: f64, [lo, hi]: [f64; 2], sd: f64) -> String {
+    let width = 0.25 * (hi - lo);
+    number(value, Some(if width > FAR_WIDER * sd { width } else { sd }))
 }
 
 /// What the residuals say of intervals that stand alone in the table.

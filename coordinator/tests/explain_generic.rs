@@ -17,17 +17,19 @@ seed = 1
 
 [model]
 kind = "equations"
-outputs = [ { name = "laser", unit = "m", value = "x" } ]
+outputs = [ { name = "laser", unit = "m", role = "other", value = "x" } ]
 
 [[model.states]]
 name = "x"
 unit = "m"
+role = "other"
 initial = 1.5
 rate = "v"
 
 [[model.states]]
 name = "v"
 unit = "m/s"
+role = "other"
 initial = 0.0
 rate = "-k*x - c*v"
 
@@ -104,9 +106,9 @@ fn found_in(
 /// The swing with the roles of its states and its output.
 fn swing_with_roles() -> String {
     SWING
-        .replace("unit = \"m\", value", "unit = \"m\", role = \"displacement\", value")
-        .replace("unit = \"m\"\n", "unit = \"m\"\nrole = \"displacement\"\n")
-        .replace("unit = \"m/s\"\n", "unit = \"m/s\"\nrole = \"velocity\"\n")
+        .replace("unit = \"m\", role = \"other\"", "unit = \"m\", role = \"displacement\"")
+        .replace("unit = \"m\"\nrole = \"other\"", "unit = \"m\"\nrole = \"displacement\"")
+        .replace("unit = \"m/s\"\nrole = \"other\"", "unit = \"m/s\"\nrole = \"velocity\"")
 }
 
 #[test]

@@ -238,12 +238,11 @@ prior = { transform = "log", median = 0.1, factor = 2.0 }
     assert_eq!(how[4], "from the third differences of the 460 samples of 5 records, pooled");
     let told: Vec<&String> = study.warnings.iter().filter(|w| w.contains("was not given")).collect();
     assert_eq!(told.len(), 1, "one for all records: {told:?}");
-    assert!(told[0].contains("the noise of `level` in 5 records was not given: 0.04"), "{told:?}");
+    assert!(told[0].contains("the noise of `level` in 5 records was not given: 0.05"), "{told:?}");
 }
 
-#[test]
-fn what_a_quantity_is_stands_in_its_unit_where_the_study_does_not_say_it() {
-    let study = r#"
+/// A ball that falls.
+const BALL: &str = r#"
 [study]
 name = "ball"
 seed = 1
@@ -268,8 +267,25 @@ file = "fall.csv"
 inputs = { push = "zero", room = "zero" }
 channels = [{ column = "x", output = "seen", noise = 0.01 }]
 "#;
+
+fn ball(study: &str) -> Study {
     let rows = (0..20).map(|k| format!("{k},{},0\n", k * k)).collect::<String>();
-    let study = load(study, &[("fall.csv", "time,x,zero\n".to_owned() + &rows)]);
+    load(study, &[("fall.csv", "time,x,zero\n".to_owned() + &rows)])
+}
+
+#[test]
+fn a_training_span_that_ends_far_behind_its_record_is_told() {
+    let told = |train: &str| {
+        let study = ball(&BALL.replace("inputs = { push", &format!("train = {train}\ninputs = {{ push")));
+        study.warnings.iter().any(|w| w.contains("`train` of record `fall` ends at"))
+    };
+    assert!(told("[0, 700]"), "milliseconds");
+    assert!(!told("[0, 15]") && !told("[0, 20]"), "a sample behind the end");
+}
+
+#[test]
+fn what_a_quantity_is_stands_in_its_unit_where_the_study_does_not_say_it() {
+    let study = ball(BALL);
     let spec = study.setup.spec().unwrap();
     let roles = |list: &[Quantity]| list.iter().map(|q| q.role).collect::<Vec<Role>>();
     assert_eq!(roles(&spec.states), [Role::Displacement, Role::Velocity]);

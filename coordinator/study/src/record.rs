@@ -19,6 +19,7 @@ mod shapes;
 mod start;
 mod surface;
 mod surface_files;
+mod training;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -157,7 +158,7 @@ impl<'a> Recordings<'a> {
             input::unknown_names(self.source, section, spec);
             return None;
         };
-        let train = training_span(self.source, section, &table.times);
+        let train = training::span(self.source, section, &table.times);
         let surfaces = self.surfaces(section)?;
         let reader = ChannelReader {
             source: self.source,
@@ -179,6 +180,7 @@ impl<'a> Recordings<'a> {
         }
         let times: Vec<f64> = rows.iter().map(|row| table.times[*row]).collect();
         let inputs = inputs(self, section, &table, &times, spec)?;
+        context.warnings.extend(training::reaches_beyond(section, &times));
         let start = start::of_run(self.source, section, &times);
         let first_rows = start::first_rows(self.source, section, &times, &channels);
         Some(Record {
@@ -257,39 +259,6 @@ impl Context<'_> {
 
 /// A training span that was refused and reported.
 struct Refused;
-
-/// The training span, `None` when the whole record is held out.
-fn training_span(
-    source: &Source,
-    section: &RecordSection,
-    times: &[f64],
-) -> Result<Option<[f64; 2]>, Refused> {
-    match &section.train {
-        Some(train) if section.held_out => {
-            let help = "remove `train`, or remove `use = \"held-out\"`";
-            source.report_with(train.span(), "a record that is held out has no training span", help);
-            Err(Refused)
-        }
-        None if section.held_out => Ok(None),
-        None => Ok(Some([f64::NEG_INFINITY, f64::INFINITY])),
-        Some(train) => {
-            let [from, to] = *train.get_ref();
-            if times.iter().any(|t| from <= *t && *t <= to) {
-                return Ok(Some([from, to]));
-            }
-            let (first, last) = (times.first().copied().unwrap_or(0.0), times.last().copied().unwrap_or(0.0));
-            source.report_with(
-                train.span(),
-                format!(
-                    "no sample of record `{}` lies in the training span [{from}, {to}]",
-                    section.name.get_ref()
-                ),
-                format!("its times run from {first} to {last}"),
-            );
-            Err(Refused)
-        }
-    }
-}
 
 /// The message of an input/output error without its number.
 fn plain(error: &std::io::Error) -> String {

@@ -24,6 +24,8 @@ pub(super) const UNINFORMED: f64 = 0.9;
 const DROPPED: f64 = 0.05;
 /// Prior standard deviations beyond which an estimate contradicts its prior.
 const FAR_FROM_PRIOR: f64 = 4.0;
+/// NIS per observation above which an estimate far from its prior may make up for what the model lacks.
+const UNEXPLAINED: f64 = 1.5;
 /// Share of the distance between two bounds within which an estimate sits at one of them.
 const AT_BOUND: f64 = 0.01;
 
@@ -132,8 +134,14 @@ fn far_from_prior(study: &Study, fit: &Fit) -> Vec<String> {
             let distance = (fit.posterior.mean[j] - prior.mean[j]).abs() / entry.prior_sd;
             let estimate = entry.transform.to_physical(fit.posterior.mean[j]);
             (distance > FAR_FROM_PRIOR).then(|| {
+                // What a model lacks is made up for by whatever can.
+                let lacks = if fit.nis_per_observation() > UNEXPLAINED {
+                    "the model may lack what that makes up for (`starlings explain`); else "
+                } else {
+                    ""
+                };
                 format!(
-                    "{} is {distance:.1} prior standard deviations from its prior median: {}.",
+                    "{} is {distance:.1} prior standard deviations from its prior median: {lacks}{}.",
                     entry.name,
                     far_remedy(entry.transform, estimate)
                 )

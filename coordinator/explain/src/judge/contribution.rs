@@ -46,7 +46,7 @@ pub(crate) fn check_contributions(found: &SearchResult<'_>, passing: &[usize]) -
     };
     let train = share(|m| m.train);
     let held_out = (whole.misfit.n_held_out > 0).then(|| share(|m| m.held_out));
-    if train >= SECOND_SHARE && held_out.is_none_or(|h| h >= SECOND_SHARE) {
+    if carries_its_share(train, held_out) {
         return all;
     }
     // A contribution that does not recur in the held-out span does not come from the form of the effect.
@@ -62,4 +62,33 @@ pub(crate) fn check_contributions(found: &SearchResult<'_>, passing: &[usize]) -
         whole.fit.variant.name()
     );
     ContributionCheck { best: alone, checked: alone, because: Some(because) }
+}
+
+/// Whether a further effect carries its share of the fall of χ², of what was fitted and of what was held out. No fit has seen the latter: what
+/// it shows makes up for a small share of the former.
+pub(crate) fn carries_its_share(train: f64, held_out: Option<f64>) -> bool {
+    match held_out {
+        None => train >= SECOND_SHARE,
+        Some(h) => h >= SECOND_SHARE && train >= SMALL_SHARE && 0.5 * (train + h) >= SECOND_SHARE,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_held_out_makes_up_for_a_small_share_of_what_was_fitted_and_not_the_other_way_round() {
+        for (train, held_out, carries) in [
+            (0.2, None, true),
+            (0.05, None, false),
+            (0.2, Some(0.2), true),
+            (0.067, Some(0.55), true),
+            (0.05, Some(0.12), false),
+            (0.005, Some(0.9), false),
+            (0.5, Some(0.05), false),
+        ] {
+            assert_eq!(carries_its_share(train, held_out), carries, "{train} {held_out:?}");
+        }
+    }
 }

@@ -183,6 +183,21 @@ fn refusal(
             (judged.evidence() <= threshold)
                 .then(|| Refusal { gate: "evidence", reason: too_weak(judged, threshold) })
         })
+        .or_else(|| {
+            (judged.standing() <= threshold * judged.inflation)
+                .then(|| Refusal { gate: "evidence", reason: too_unlikely(judged, threshold) })
+        })
+}
+
+/// That what speaks for a variant does not make up for how unlikely its kind is before any data, in words.
+fn too_unlikely(judged: &JudgedFit<'_>, threshold: f64) -> String {
+    let kinds: Vec<&str> = judged.kinds().into_iter().map(Kind::plural).collect();
+    format!(
+        "all data together speak for it with {:.1} in units of the effective noise, where a search like this one reaches {threshold:.1} by \
+         chance: less than makes up for how unlikely {} are before any data, so that nothing being missing stays likelier",
+        judged.rank() / judged.inflation,
+        kinds[0]
+    )
 }
 
 /// That the fall of χ² is not more than chance reaches, in words.

@@ -13,6 +13,8 @@ use crate::screen::screening_result::ScreeningResult;
 
 /// How the study says that a noise was given and not found.
 const GIVEN: &str = "given";
+/// Share of the gap below which an effect takes nothing of it away.
+const NOTHING: f64 = 0.01;
 /// Share of white noise in the residuals above which the rest of them must be white too ...
 const AUDIBLE: f64 = 0.12;
 /// ... if their effective variance is above this.
@@ -33,6 +35,14 @@ pub(crate) fn nearest_refused(found: &SearchResult<'_>) -> String {
         || nothing_refitted(found),
         |(judged, refusal)| {
             let name = judged.fit.variant.name();
+            if judged.share < NOTHING {
+                return format!(
+                    "none of the {} that were refitted takes away as much as {:.0} % of the gap on the training data, `{name}` least \
+                     badly",
+                    found.judged.len(),
+                    100.0 * NOTHING
+                );
+            }
             format!(
                 "`{name}` comes nearest and is refused by the gate `{}`: {}",
                 refusal.gate, refusal.reason
@@ -110,8 +120,19 @@ pub(crate) fn objection(
 /// noise that was found is no judgement.
 fn is_remainder(cache: &RunCache<'_>, judged: &JudgedFit<'_>) -> bool {
     let is_heard = white_noise(&cache.rows, judged.fit.residual()) >= AS_STATED[0];
+    is_stated(cache) && !is_heard && is_next_to_nothing(judged)
+}
+
+/// Whether the noise was found, from differences in which a memory does not show, and what is left above it is next to nothing of the gap and
+/// nowhere far from it: then it may be that noise.
+fn may_be_noise_with_memory(cache: &RunCache<'_>, judged: &JudgedFit<'_>) -> bool {
+    !is_stated(cache) && is_next_to_nothing(judged)
+}
+
+/// Whether what is left above the noise is less than a further effect would have to bring, and nothing is far from it, held out or not.
+fn is_next_to_nothing(judged: &JudgedFit<'_>) -> bool {
     let is_near = judged.adequacy.rmse_over_noise <= FAR && judged.held_out.iter().all(|h| h.beyond <= FAR);
-    is_stated(cache) && !is_heard && is_near && judged.share >= 1.0 - SECOND_SHARE
+    is_near && judged.share >= 1.0 - SECOND_SHARE
 }
 
 /// Whether the study gives the noise of every fitted channel.
@@ -143,7 +164,7 @@ fn correlated(cache: &RunCache<'_>, found: &SearchResult<'_>, judged: &JudgedFit
         (white_share(&cache.rows, judged.fit.residual()), white_noise(&cache.rows, judged.fit.residual()));
     // Where the stated noise is the one that is heard, it is no judgement, and the more is left the less of it is noise.
     let is_audible = white > AUDIBLE || (heard >= AS_STATED[0] && is_stated(cache));
-    if is_audible && judged.inflation > STRUCTURED {
+    if is_audible && judged.inflation > STRUCTURED && !may_be_noise_with_memory(cache, judged) {
         return Some(format!(
             "{}, but white noise makes {:.0} % of what is left and so shows that the rest is none: its form is not right, or \
              something else is missing too",

@@ -53,6 +53,14 @@ pub struct ProbableSet {
 }
 
 impl Probabilities {
+    /// Where noise cannot be what the model leaves, something is missing: what no set accounts for is in no list.
+    fn with_gap(mut self, is_gap: bool) -> Self {
+        if is_gap {
+            self.none_of_these += std::mem::take(&mut self.nothing_missing);
+        }
+        self
+    }
+
     /// The most probable answers in words, and what is left of the gap.
     pub fn lines(&self) -> Vec<String> {
         let sets = self.sets.iter().take(TOLD).map(|set| {
@@ -112,7 +120,8 @@ pub(crate) fn probabilities(
     let of_verdict = odds(decision.verdict, is_untested) * UNLISTED / (1.0 - UNLISTED);
     let listed = 1.0 / (1.0 + of_verdict);
     let left = best.filter(|_| is_answered).map(|j| &j.adequacy);
-    Some(shared(weights, left.map_or(listed, |left| still_listed(listed, left, discrepancy)), discrepancy))
+    let listed = left.map_or(listed, |left| still_listed(listed, left, discrepancy));
+    Some(shared(weights, listed, discrepancy).with_gap(found.adequacy.is_gap()))
 }
 
 /// How often a verdict falls where the truth is in no list, over how often where it is.
@@ -223,5 +232,10 @@ mod tests {
     fn without_any_set_nothing_is_missing_or_it_is_in_no_list() {
         let of = shared(Vec::new(), 0.2, 1.0);
         assert!((of.nothing_missing - 0.2).abs() < 1e-12 && (of.none_of_these - 0.8).abs() < 1e-12);
+        let of = of.with_gap(true);
+        assert!(
+            of.nothing_missing.abs() < 1e-12 && (of.none_of_these - 1.0).abs() < 1e-12,
+            "a gap is no chance"
+        );
     }
 }

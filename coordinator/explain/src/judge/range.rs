@@ -9,7 +9,8 @@ use crate::fit::fitted_variant::FittedVariant;
 use crate::fit::model_variant::AddedEffect;
 use crate::number::three;
 
-/// Distance from the end of a range, as a share of its width, within which an estimate counts as at the end.
+/// Distance from the end of a range, as a share of its width, of one that begins above zero in the logarithm, within which an estimate counts as
+/// at the end.
 const EDGE: f64 = 0.005;
 
 /// The refusal for a coefficient at the end of its range.
@@ -43,6 +44,11 @@ fn end_at(effect: &AddedEffect<'_>, k: usize, value: f64) -> Option<f64> {
     let candidate = effect.candidate;
     let parameter = &candidate.def.parameters[k];
     let [lo, hi] = parameter.range;
+    let ends = if parameter.is_rounding { [hi, hi] } else { [lo, hi] };
+    // A range from a hundredth to twenty spans factors: what is ten times its lower end is not at that end.
+    if lo > 0.0 && hi.is_finite() {
+        return ends.into_iter().find(|end| (value / end).ln().abs() <= EDGE * (hi / lo).ln());
+    }
     let width = if lo.is_finite() && hi.is_finite() {
         hi - lo
     } else if k == 0 {
@@ -50,7 +56,6 @@ fn end_at(effect: &AddedEffect<'_>, k: usize, value: f64) -> Option<f64> {
     } else {
         candidate.points[0][k - 1].abs()
     };
-    let ends = if parameter.is_rounding { [hi, hi] } else { [lo, hi] };
     ends.into_iter().find(|end| end.is_finite() && (value - end).abs() <= EDGE * width)
 }
 
@@ -70,6 +75,7 @@ mod tests {
             with([2.0, f64::INFINITY], vec![3.0]),
             with(wide, vec![]),
             EffectParameter { is_rounding: true, ..with(wide, vec![]) },
+            with([0.01, 20.0], vec![1.0]),
         ];
         let candidate = Candidate::new(EffectDef { parameters, ..EffectDef::default() });
         // The amplitude's unit is not that of the threshold inside the term: thousands against ones, or thousandths.
@@ -87,6 +93,11 @@ mod tests {
                 "a sharp corner"
             );
             assert_eq!(end_at(&effect, 3, 9.96), Some(10.0));
+            assert_eq!(
+                (end_at(&effect, 4, 0.0102), end_at(&effect, 4, 0.091)),
+                (Some(0.01), None),
+                "factors"
+            );
         }
     }
 }

@@ -35,4 +35,38 @@ impl<'c> Searcher<'_, '_, 'c> {
         fits.retain(|fit| !fit.residual().is_empty());
         Ok(fits)
     }
+
+    /// Pairs that ended above one of their members alone, as no pair does at its best, refitted from there.
+    pub(super) fn none_above_its_parts(
+        &mut self,
+        found: &SearchResult<'c>,
+        mut fits: Vec<FittedVariant<'c>>,
+    ) -> Result<Vec<FittedVariant<'c>>, ExplainError> {
+        let (mut begun, mut places) = (Vec::new(), Vec::new());
+        for (place, pair) in fits.iter().enumerate().filter(|(_, fit)| fit.variant.effects.len() == 2) {
+            let known = found.judged.iter().map(|judged| &judged.fit).chain(&fits);
+            let parts = known.filter(|fit| is_part(fit, pair) && fit.cost() < pair.cost());
+            let Some(part) = parts.min_by(|a, b| a.cost().total_cmp(&b.cost())) else { continue };
+            let alone = part.variant.effects[0].index;
+            let other = usize::from(pair.variant.effects[0].index == alone);
+            let variant = pair.variant.clone();
+            let start = variant.continue_from(&part.variant, part.z(), &pair.values_of(other)[1..]);
+            begun.push(FittedVariant::begin(variant, start));
+            places.push(place);
+        }
+        for (place, fit) in places.into_iter().zip(self.refit(begun)?) {
+            if !fit.residual().is_empty() && fit.cost() < fits[place].cost() {
+                fits[place] = fit;
+            }
+        }
+        Ok(fits)
+    }
+}
+
+/// Whether a variant is a pair less one of its effects.
+fn is_part(fit: &FittedVariant<'_>, pair: &FittedVariant<'_>) -> bool {
+    let (own, of_pair) = (&fit.variant, &pair.variant);
+    own.left_out == of_pair.left_out
+        && own.effects.len() == 1
+        && of_pair.effects.iter().any(|effect| effect.index == own.effects[0].index)
 }

@@ -87,6 +87,7 @@ impl<'c> Searcher<'_, '_, 'c> {
         }
         let mut fits = self.refit(first)?;
         fits.extend(self.members_alone(found, &fits)?);
+        let fits = self.none_above_its_parts(found, fits)?;
         self.judge_all(found, fits)
     }
 

@@ -28,9 +28,9 @@ impl CorrelatedChannel {
     }
 }
 
-/// What the model as it is leaves that could be correlated noise, whose size nobody gave, in words with the remedy; `predicted` is by that
-/// model.
-pub(crate) fn larger(study: &Study, rows: &Rows, predicted: &[f64]) -> Vec<String> {
+/// What a model leaves that could be correlated noise, whose size nobody gave, in words with the remedy; `predicted` is by that model, which
+/// has this name.
+pub(crate) fn larger(study: &Study, rows: &Rows, predicted: &[f64], model: &str) -> Vec<String> {
     let says = |LargerNoise { output, factor, noise }| {
         let mut trained = rows.train.iter().map(|i| &rows.rows[*i]);
         let row = trained.find(|row| row.output == output && row.noise_freedom.is_finite())?;
@@ -38,7 +38,7 @@ pub(crate) fn larger(study: &Study, rows: &Rows, predicted: &[f64]) -> Vec<Strin
         let sd = three(factor * row.noise);
         let length = format!("{}{}", three(noise.length), spaced(&study.time_unit));
         Some(format!(
-            "what the model as it is leaves of `{name}` could be noise of {sd}{unit} that is correlated over {length}: the noise \
+            "what {model} leaves of `{name}` could be noise of {sd}{unit} that is correlated over {length}: the noise \
              that was found leaves out what changes slowly. If the sensor has that, give `noise = {sd}`: only what exceeds it then counts as a gap"
         ))
     };

@@ -6,6 +6,8 @@ use starlings_models::units::spaced;
 
 use super::result::Rejected;
 use crate::fit::candidate::Candidate;
+use crate::judge::contribution::carries_its_share;
+use crate::judge::gates::JudgedFit;
 use crate::judge::misfit::Misfit;
 use crate::judge::search_result::SearchResult;
 use crate::judge::verdict::Decision;
@@ -21,7 +23,13 @@ pub(crate) fn rejected(
 ) -> Vec<Rejected> {
     let mut list = Vec::new();
     let keep: Vec<usize> = decision.best.iter().copied().chain(decision.rivals.clone()).collect();
-    for (i, judged) in found.judged.iter().enumerate().filter(|(i, _)| !keep.contains(i)) {
+    // Another start of what is told is no other answer.
+    let is_told = |judged: &JudgedFit<'_>| {
+        let variant = |j: &JudgedFit<'_>| (j.names(), j.fit.variant.left_out.clone());
+        keep.iter().any(|k| variant(&found.judged[*k]) == variant(judged))
+    };
+    let others = found.judged.iter().enumerate().filter(|(i, judged)| !keep.contains(i) && !is_told(judged));
+    for (i, judged) in others {
         let (gate, reason) = match &judged.refusal {
             Some(refusal) => (refusal.gate.to_owned(), refusal.reason.clone()),
             None => ("evidence".to_owned(), behind(found, decision, i)),
@@ -79,12 +87,12 @@ fn behind(found: &SearchResult<'_>, decision: &Decision, i: usize) -> String {
         };
         let train = of(|m| m.train);
         let held_out = (judged.misfit.n_held_out > 0).then(|| of(|m| m.held_out));
-        if train < 10.0 || held_out.is_some_and(|h| h < 10.0) {
+        if !carries_its_share(train / 100.0, held_out.map(|h| h / 100.0)) {
             return format!(
-                "beyond `{name}` it takes away {train:.1} % of the gap on the training data{}: a further effect must carry a \
-                 tenth of {}",
+                "beyond `{name}` it takes away {train:.1} % of the gap on the training data{}: a further effect must carry a tenth of \
+                 it{}",
                 held_out.map_or_else(String::new, |h| format!(" and {h:.1} % on the held-out span")),
-                if held_out.is_some() { "both" } else { "it" }
+                if held_out.is_some() { ", and of what was held out" } else { "" }
             );
         }
     }

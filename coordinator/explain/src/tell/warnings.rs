@@ -20,6 +20,8 @@ use crate::rows::Usage;
 use crate::run_cache::RunCache;
 use crate::screen::not_tried;
 
+/// Prior standard deviations beyond which an estimate contradicts its prior.
+const FAR_FROM_PRIOR: f64 = 4.0;
 /// Distance in noise sd within which two simulated values are the same.
 const SAME: f64 = 0.01;
 
@@ -80,6 +82,35 @@ fn still_failing(judged: &JudgedFit<'_>) -> Option<String> {
     })
 }
 
+/// That the model as it is had to go far from its priors: an influence measured there may be another than where the model holds.
+fn far_from_prior(base: &FittedVariant<'_>) -> Option<String> {
+    let names = base.z().iter().zip(&base.variant.study.theta).filter(|(z, _)| z.abs() > FAR_FROM_PRIOR);
+    let far: Vec<String> = names.map(|(z, entry)| format!("{} ({:.1})", entry.name, z.abs())).collect();
+    (!far.is_empty()).then(|| {
+        format!(
+            "the model as it is comes nearest to the data far from its priors, in prior standard deviations: {}. Effects were scored there, \
+             where they may do something else than near the priors: narrower ones keep the model where it is meant",
+            far.join(", ")
+        )
+    })
+}
+
+/// What could be correlated noise that was found too small: of the model as it is where nothing explains the gap, else of what is told or came
+/// nearest.
+fn larger_noise(
+    cache: &RunCache<'_>,
+    found: &SearchResult<'_>,
+    decision: &Decision,
+    best: Option<&JudgedFit<'_>>,
+) -> Vec<String> {
+    let of = |fit: &FittedVariant<'_>, name: &str| {
+        correlated::larger(cache.study, &cache.rows, &fit.predicted, name)
+    };
+    let as_it_is = (decision.verdict == Verdict::Unexplained).then(|| of(&found.base, "the model as it is"));
+    let told = || best.map(|judged| of(&judged.fit, &format!("`{}`", judged.fit.variant.name())));
+    as_it_is.filter(|said| !said.is_empty()).or_else(told).unwrap_or_default()
+}
+
 /// Whether there is a gap and no effect of a field explains it.
 fn is_without_physics(found: &SearchResult<'_>, decision: &Decision) -> bool {
     let told = decision.best.filter(|_| matches!(decision.verdict, Verdict::Named | Verdict::Tie));
@@ -128,10 +159,11 @@ pub(crate) fn warnings(cache: &RunCache<'_>, found: &SearchResult<'_>, decision:
     if is_without_physics(found, decision) {
         list.extend(not_tried::without_roles(cache.study));
     }
-    if decision.verdict == Verdict::Unexplained {
-        list.extend(correlated::larger(cache.study, &cache.rows, &found.base.predicted));
+    if decision.verdict != Verdict::NoGap {
+        list.extend(far_from_prior(&found.base));
     }
     let best = decision.best.map(|i| &found.judged[i]);
+    list.extend(larger_noise(cache, found, decision, best));
     list.extend(best.and_then(|judged| unfinished(&judged.fit)));
     if let Some(judged) = best.filter(|j| j.inflation > 3.0) {
         let name = judged.fit.variant.name();

@@ -41,7 +41,7 @@ pub(super) fn nis(fit: &Fit, residuals: &[Residuals]) -> Option<String> {
         let far = if ratio > 1.5 { "far above" } else { "above" };
         Some(format!(
             "NIS is {ratio:.2} per observation, {far} 1 ({band}): the model does not explain the data at the stated noise; \
-             residuals are about {:.1} times the noise and the intervals at the stated noise too narrow. Look for a missing effect, or state \
+             residuals are about {:.1} times the noise and the intervals at the stated noise too narrow. Look for a missing effect by `starlings explain`, or state \
              a larger noise.",
             ratio.sqrt()
         ))

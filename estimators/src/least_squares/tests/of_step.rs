@@ -107,3 +107,34 @@ fn a_step_that_one_bound_cuts_off_still_leads_downhill() {
     let best = 2010.2 / 10_001.0;
     assert!(fit.best().0[0].abs() < 1e-12 && (fit.best().0[1] - best).abs() < 1e-6, "{}", fit.best().0);
 }
+
+#[test]
+fn what_stops_at_an_end_and_what_makes_up_for_it_are_shortened_alike() {
+    // y = e^(0.4 z0) t + 0.31 z1 (t + 0.1 sin t) + 0.01 z2 (t + 0.01 sin 3t), nearly one function: e^(0.4 z0) ends at a tenth and 0.31 z1 at
+    // 0.9. A step leaves a third of the first, for which the last could make up with -23 units, of which it may go three.
+    let functions = |i: usize| {
+        let t = 0.3 * i as f64;
+        [t, t + 0.1 * t.sin(), t + 0.01 * (3.0 * t).sin()].map(|y| y / 0.001)
+    };
+    let residual = |z: &DVector<f64>| {
+        let left = [0.1 - (0.4 * z[0]).exp(), 0.9 - 0.31 * z[1], -0.01 * z[2]];
+        DVector::from_fn(30, |i, _| left.iter().zip(functions(i)).map(|(share, y)| share * y).sum())
+    };
+    let jacobian = |z: &DVector<f64>| {
+        let slopes = [0.4 * (0.4 * z[0]).exp(), 0.31, 0.01];
+        DMatrix::from_fn(30, 3, |i, j| slopes[j] * functions(i)[j])
+    };
+    let prior = Scaled { growth: DVector::from_vec(vec![0.4, 0.0, 0.0]), ..flat(3) };
+    let mut fit = LeastSquares::new(DVector::zeros(3), prior, 1e-6, 120);
+    let end = loop {
+        match fit.need().clone() {
+            Need::Residual(z) => fit.give_residual(Some(residual(&z))),
+            Need::Jacobian(z) => fit.give_jacobian(Some(jacobian(&z).into())),
+            Need::Nothing(end) => break end,
+        }
+    };
+    let z = fit.best().0;
+    assert_eq!(end, End::Converged, "{z:?}");
+    // The residuals vanish there, to a cost of 1e-6 in which the last two functions differ by thousands of sd.
+    assert!(fit.cost() < 1e-3 && (0.31 * z[1] - 0.9).abs() < 1e-2, "{z:?} {}", fit.cost());
+}
