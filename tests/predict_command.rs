@@ -106,14 +106,8 @@ fn a_forecast_shows_them_too(out: &Path) {
     assert_eq!(names, ["position", "velocity", "x"]);
 }
 
-#[test]
-fn a_solver_tells_any_output_that_it_describes() {
-    let folder = tempfile::tempdir().unwrap();
-    let program = "import json, sys\nrun = json.load(sys.stdin)\nslope = run['parameters']['slope']\n\
-                   print(json.dumps({'y': [slope * t for t in run['times']], 'twice': [2 * slope * t for t in run['times']]}))\n";
-    std::fs::write(folder.path().join("line.py"), program).unwrap();
-    std::fs::write(folder.path().join("data.csv"), "time,y\n1,2.1\n2,3.9\n3,6.05\n").unwrap();
-    let text = r#"[study]
+/// A study of a solver that gives `y` and `twice`, of which `twice` is predicted.
+const LINE: &str = r#"[study]
 name = "line"
 [model]
 kind = "solver"
@@ -134,8 +128,22 @@ kind = "batch"
 outputs = ["twice"]
 members = 40
 "#;
-    let file = folder.path().join("study.toml");
+
+/// A folder with that solver and its recording.
+fn line(folder: &Path, text: &str) -> PathBuf {
+    let program = "import json, sys\nrun = json.load(sys.stdin)\nslope = run['parameters']['slope']\n\
+                   print(json.dumps({'y': [slope * t for t in run['times']], 'twice': [2 * slope * t for t in run['times']]}))\n";
+    std::fs::write(folder.join("line.py"), program).unwrap();
+    std::fs::write(folder.join("data.csv"), "time,y\n1,2.1\n2,3.9\n3,6.05\n").unwrap();
+    let file = folder.join("study.toml");
     std::fs::write(&file, text).unwrap();
+    file
+}
+
+#[test]
+fn a_solver_tells_any_output_that_it_describes() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = line(folder.path(), LINE);
     let summary = run(&file, &folder.path().join("run"), 2);
     let slope = summary["parameters"][0]["estimate"].as_f64().unwrap();
     let highest = &summary["predictions"][0]["highest"];
@@ -146,11 +154,25 @@ members = 40
     // 6 times the slope, whose sd is 0.1 over √14: the median of forty draws is within half an sd of it, 0.08.
     assert!((estimate - 6.0 * slope).abs() < 0.1, "{estimate} for {slope}");
     assert!((0.3..1.2).contains(&(hi - lo)), "{lo} {hi}");
-    let other = text.replace("[\"twice\"]", "[\"thrice\"]");
+    let other = LINE.replace("[\"twice\"]", "[\"thrice\"]");
     std::fs::write(&file, other).unwrap();
     let told = ["no worker can give `thrice`", "did you mean `twice`?"];
     refused(starlings().arg("run").arg(&file).arg("--out").arg(folder.path().join("other")), &told);
     assert!(!folder.path().join("other").exists(), "nothing is half done");
+}
+
+#[test]
+fn an_output_that_a_solver_declares_and_never_gives_is_refused_before_the_fit() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = LINE
+        .replace("{ name = \"twice\", unit = \"m\" }", "{ name = \"ghost\" }")
+        .replace("\"twice\"", "\"ghost\"");
+    let file = line(folder.path(), &text);
+    let told =
+        ["`ghost` of `[predict]` cannot be predicted", "no key `ghost`; it has y, twice", "(slope = 1)"];
+    refused(starlings().arg("check").arg(&file), &told);
+    refused(starlings().arg("run").arg(&file).arg("--out").arg(folder.path().join("out")), &told);
+    assert!(!folder.path().join("out").exists(), "no fit was made");
 }
 
 #[test]

@@ -1,8 +1,9 @@
 //! One trial run of every record at the prior median: whether the model runs where the study starts.
 //!
 //! It is made in this process, or by the workers where nothing of the model may run here or its states are large. Next files to read:
-//! [`mod@dry_run`], which makes the runs of a fit, and [`on_fleet`].
+//! [`mod@dry_run`], which makes the runs of a fit, [`mod@asked`], which asks for what `[predict]` names, and [`on_fleet`].
 
+mod asked;
 pub mod dry_run;
 pub mod on_fleet;
 
@@ -61,6 +62,21 @@ pub enum TrialError {
         record: String,
         /// What is run, such as `over the training span alone, 0 to 48`.
         span: String,
+        /// The values it was run with.
+        values: String,
+        /// Why it failed.
+        source: ParticleError,
+    },
+    /// What the study measures runs, and what it predicts does not.
+    #[error(
+        "{outputs} of `[predict]` cannot be predicted: a run over record `{record}` at the prior median fails that asks for nothing \
+         else ({values}): {source}; take out of `outputs` in `[predict]` what the model does not give, or make it give that"
+    )]
+    Predict {
+        /// What is predicted, in quotes.
+        outputs: String,
+        /// Record name.
+        record: String,
         /// The values it was run with.
         values: String,
         /// Why it failed.
