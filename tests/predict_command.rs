@@ -169,10 +169,30 @@ fn an_output_that_a_solver_declares_and_never_gives_is_refused_before_the_fit() 
         .replace("\"twice\"", "\"ghost\"");
     let file = line(folder.path(), &text);
     let told =
-        ["`ghost` of `[predict]` cannot be predicted", "no key `ghost`; it has y, twice", "(slope = 1)"];
+        ["`ghost` of `[predict]` cannot be predicted", "no key `ghost`; it has twice, y", "(slope = 1)"];
     refused(starlings().arg("check").arg(&file), &told);
     refused(starlings().arg("run").arg(&file).arg("--out").arg(folder.path().join("out")), &told);
     assert!(!folder.path().join("out").exists(), "no fit was made");
+}
+
+#[test]
+fn predictions_that_fail_are_told_once_and_parameters_are_not_blamed() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = line(folder.path(), LINE);
+    // Whoever asks for `twice` anywhere but at the prior median gets nothing.
+    let program = std::fs::read_to_string(folder.path().join("line.py")).unwrap();
+    let program = program.replace(
+        "print(",
+        "if 'twice' in run['outputs'] and abs(slope - 1) > 1e-9: sys.exit('none')\nprint(",
+    );
+    std::fs::write(folder.path().join("line.py"), program).unwrap();
+    let summary = run(&file, &folder.path().join("run"), 2);
+    let warnings = summary["warnings"].to_string();
+    assert!(
+        warnings.contains("40 of 40 runs of `[predict]` over record `one` have no prediction"),
+        "{warnings}"
+    );
+    assert!(!warnings.contains("tells them") && !warnings.contains("runs failed with"), "{warnings}");
 }
 
 #[test]
@@ -189,6 +209,11 @@ fn what_cannot_be_predicted_is_refused_before_anything_runs() {
         ("step = 0.05", "step = 0.0", &["`step` is 0: give a number above zero"]),
         ("step = 0.05", "step = 1e-9", &["numbers", "a longer `step`"]),
         ("outputs = [\"velocity\", \"x\"]\n", "", &["outputs"]),
+        (
+            "[\"velocity\", \"x\"]",
+            "[]",
+            &["`outputs` of [predict] names nothing", "or leave out `[predict]`"],
+        ),
     ] {
         let text = asking().replace(from, to);
         assert_ne!(text, asking());
