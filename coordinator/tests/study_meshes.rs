@@ -132,6 +132,8 @@ fn meshes_that_are_open_inverted_or_of_another_unit_are_refused_with_their_file(
         assert!(inverted.contains("point inward where triangle 0 is"), "{inverted}");
         let twisted = said(ending, write, MESHES, |(_, triangles)| triangles[7].swap(0, 1));
         assert!(twisted.contains("7 of the surface have opposite normals"), "{twisted}");
+        let twice = said(ending, write, MESHES, |(_, triangles)| triangles.push(triangles[7]));
+        assert!(twice.contains("triangles 7 and 576 of the surface have the same vertices"), "{twice}");
         let larger = said(ending, write, MESHES, |(vertices, _)| {
             vertices.iter_mut().flatten().for_each(|x| *x *= 1000.0);
         });
