@@ -251,9 +251,22 @@ pub(crate) fn hangs_on(found: &HangsOn) -> Result<(), Failure> {
     for sentence in found.sentences(TOLD) {
         line(format_args!("hangs on a constant: {sentence}"))?;
     }
-    line(format_args!(
-        "{} constants moved by 1 %, {} runs: all figures are in the report",
-        found.constants.len(),
-        found.runs
-    ))
+    line(moved(found.constants.len(), found.runs))
+}
+
+/// How many constants were moved, and in how many runs.
+fn moved(n: usize, runs: u64) -> String {
+    let constants = if n == 1 { "constant" } else { "constants" };
+    format!("{n} {constants} moved by 1 %, {runs} runs: all figures are in the report")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::moved;
+
+    #[test]
+    fn one_constant_is_a_constant() {
+        assert_eq!(moved(1, 4), "1 constant moved by 1 %, 4 runs: all figures are in the report");
+        assert_eq!(moved(2, 6), "2 constants moved by 1 %, 6 runs: all figures are in the report");
+    }
 }

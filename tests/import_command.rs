@@ -132,7 +132,16 @@ fn blocks_keys_and_values_that_are_not_understood_are_named() {
         ("/boundary_conditions/1/bc_values/R", json!([1.0, 2.0]), "boundary_conditions[1].bc_values.R"),
         ("/boundary_conditions/1/bc_values/R", json!(-1.0), "-1 is not above zero"),
         ("/boundary_conditions/1/bc_values/Q", json!(1.0), "unknown field `Q`"),
-        ("/boundary_conditions/1/bc_name", json!("OUT9"), "`OUT9` is joined to nothing"),
+        (
+            "/boundary_conditions/1/bc_name",
+            json!("OUT9"),
+            "boundary_conditions.outlet: no boundary condition is called `OUT1`; did you mean `OUT9`?",
+        ),
+        (
+            "/vessels/1/zero_d_element_values/stenosis_coefficient",
+            json!(-10.0),
+            "changed.json: vessels[1].zero_d_element_values: the stenosis",
+        ),
         ("/boundary_conditions/0/bc_values/t", json!([0.0, 0.0]), "time 0 is not later"),
         ("/boundary_conditions/0/bc_values/t", json!([0.0]), "1 times and 2 values"),
         ("/vessels/0/zero_d_element_type", json!("Chamber"), "a vessel of type `Chamber`"),
@@ -169,6 +178,9 @@ fn blocks_keys_and_values_that_are_not_understood_are_named() {
     refused(starlings().arg("import").arg(path).arg("--out").arg(&out), &["is there already", "--out"]);
 }
 
+/// A vessel with the label of another.
+const TWICE: &str = "network:\n  - {label: upper_thoracic_aorta, sn: 2, tn: 8, L: 0.1, E: 400.0e3, R0: 9.0e-3, gamma_profile: 9}";
+
 /// A vessel apart from the others.
 const SECOND_INLET: &str = "network:\n  - {label: other, sn: 7, tn: 8, L: 0.1, E: 400.0e3, R0: 9.0e-3, h0: 0.8e-3, gamma_profile: 9}";
 
@@ -193,7 +205,10 @@ fn an_aorta_of_openbf_runs_and_what_the_model_lacks_is_named() {
         ("gamma_profile: 9", "gamma profile: 9", "write `gamma_profile`"),
         ("gamma_profile: 9", "colour: red", "unknown field `colour`"),
         ("E: 400.0e3", "E: -1.0", "E is -1"),
-        ("E: 400.0e3", "E: stiff", "line 17"),
+        ("E: 400.0e3", "E: stiff", "uta.yaml: line 17, column 8: `E`: invalid floating point"),
+        ("    E: 400.0e3", "\tE: 400.0e3", "line 17: a tab stands before `E`: YAML takes blanks alone there"),
+        ("    Cc: 1.0163e-8\n", "", "it has R1 and R2 and not Cc"),
+        ("network:", TWICE, "network[1]: the label `upper_thoracic_aorta` is that of network[0] as well"),
         ("tn: 2", "tn: 1", "none where the flow enters"),
         ("network:", SECOND_INLET, "nodes 1 and 7 are only starts of vessels: the file names one inflow"),
         ("uta_inlet.dat", "none.dat", "none.dat cannot be read"),
@@ -204,6 +219,20 @@ fn an_aorta_of_openbf_runs_and_what_the_model_lacks_is_named() {
         refused(starlings().arg("import").arg(&path).arg("--out").arg(&other), &[words]);
         assert!(!other.exists());
     }
+}
+
+#[test]
+fn vessels_that_are_nothing_but_a_joint_are_told_with_the_outputs_that_there_are_not() {
+    let folder = TempDir::new().unwrap();
+    let text = std::fs::read_to_string(file("svzerodsolver/steadyFlow_bifurcationR_R1.json")).unwrap();
+    let mut network: Value = serde_json::from_str(&text).unwrap();
+    network["vessels"][1]["zero_d_element_values"] = json!({ "R_poiseuille": 0.0 });
+    let path = folder.path().join("joint.json");
+    std::fs::write(&path, network.to_string()).unwrap();
+    let notes = import(&path, &folder.path().join("joint"))["notes"].to_string();
+    let told = "`branch1_seg0` has neither a resistance nor an inertance: its two ends are one node, and the study has no `q_branch1_seg0`, \
+                `p_J0`";
+    assert!(notes.contains(told), "{notes}");
 }
 
 #[test]

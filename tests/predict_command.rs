@@ -106,14 +106,8 @@ fn a_forecast_shows_them_too(out: &Path) {
     assert_eq!(names, ["position", "velocity", "x"]);
 }
 
-#[test]
-fn a_solver_tells_any_output_that_it_describes() {
-    let folder = tempfile::tempdir().unwrap();
-    let program = "import json, sys\nrun = json.load(sys.stdin)\nslope = run['parameters']['slope']\n\
-                   print(json.dumps({'y': [slope * t for t in run['times']], 'twice': [2 * slope * t for t in run['times']]}))\n";
-    std::fs::write(folder.path().join("line.py"), program).unwrap();
-    std::fs::write(folder.path().join("data.csv"), "time,y\n1,2.1\n2,3.9\n3,6.05\n").unwrap();
-    let text = r#"[study]
+/// A study of a solver that gives `y` and `twice`, of which `twice` is predicted.
+const LINE: &str = r#"[study]
 name = "line"
 [model]
 kind = "solver"
@@ -134,8 +128,22 @@ kind = "batch"
 outputs = ["twice"]
 members = 40
 "#;
-    let file = folder.path().join("study.toml");
+
+/// A folder with that solver and its recording.
+fn line(folder: &Path, text: &str) -> PathBuf {
+    let program = "import json, sys\nrun = json.load(sys.stdin)\nslope = run['parameters']['slope']\n\
+                   print(json.dumps({'y': [slope * t for t in run['times']], 'twice': [2 * slope * t for t in run['times']]}))\n";
+    std::fs::write(folder.join("line.py"), program).unwrap();
+    std::fs::write(folder.join("data.csv"), "time,y\n1,2.1\n2,3.9\n3,6.05\n").unwrap();
+    let file = folder.join("study.toml");
     std::fs::write(&file, text).unwrap();
+    file
+}
+
+#[test]
+fn a_solver_tells_any_output_that_it_describes() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = line(folder.path(), LINE);
     let summary = run(&file, &folder.path().join("run"), 2);
     let slope = summary["parameters"][0]["estimate"].as_f64().unwrap();
     let highest = &summary["predictions"][0]["highest"];
@@ -146,11 +154,45 @@ members = 40
     // 6 times the slope, whose sd is 0.1 over √14: the median of forty draws is within half an sd of it, 0.08.
     assert!((estimate - 6.0 * slope).abs() < 0.1, "{estimate} for {slope}");
     assert!((0.3..1.2).contains(&(hi - lo)), "{lo} {hi}");
-    let other = text.replace("[\"twice\"]", "[\"thrice\"]");
+    let other = LINE.replace("[\"twice\"]", "[\"thrice\"]");
     std::fs::write(&file, other).unwrap();
     let told = ["no worker can give `thrice`", "did you mean `twice`?"];
     refused(starlings().arg("run").arg(&file).arg("--out").arg(folder.path().join("other")), &told);
     assert!(!folder.path().join("other").exists(), "nothing is half done");
+}
+
+#[test]
+fn an_output_that_a_solver_declares_and_never_gives_is_refused_before_the_fit() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = LINE
+        .replace("{ name = \"twice\", unit = \"m\" }", "{ name = \"ghost\" }")
+        .replace("\"twice\"", "\"ghost\"");
+    let file = line(folder.path(), &text);
+    let told =
+        ["`ghost` of `[predict]` cannot be predicted", "no key `ghost`; it has twice, y", "(slope = 1)"];
+    refused(starlings().arg("check").arg(&file), &told);
+    refused(starlings().arg("run").arg(&file).arg("--out").arg(folder.path().join("out")), &told);
+    assert!(!folder.path().join("out").exists(), "no fit was made");
+}
+
+#[test]
+fn predictions_that_fail_are_told_once_and_parameters_are_not_blamed() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = line(folder.path(), LINE);
+    // Whoever asks for `twice` anywhere but at the prior median gets nothing.
+    let program = std::fs::read_to_string(folder.path().join("line.py")).unwrap();
+    let program = program.replace(
+        "print(",
+        "if 'twice' in run['outputs'] and abs(slope - 1) > 1e-9: sys.exit('none')\nprint(",
+    );
+    std::fs::write(folder.path().join("line.py"), program).unwrap();
+    let summary = run(&file, &folder.path().join("run"), 2);
+    let warnings = summary["warnings"].to_string();
+    assert!(
+        warnings.contains("40 of 40 runs of `[predict]` over record `one` have no prediction"),
+        "{warnings}"
+    );
+    assert!(!warnings.contains("tells them") && !warnings.contains("runs failed with"), "{warnings}");
 }
 
 #[test]
@@ -167,6 +209,11 @@ fn what_cannot_be_predicted_is_refused_before_anything_runs() {
         ("step = 0.05", "step = 0.0", &["`step` is 0: give a number above zero"]),
         ("step = 0.05", "step = 1e-9", &["numbers", "a longer `step`"]),
         ("outputs = [\"velocity\", \"x\"]\n", "", &["outputs"]),
+        (
+            "[\"velocity\", \"x\"]",
+            "[]",
+            &["`outputs` of [predict] names nothing", "or leave out `[predict]`"],
+        ),
     ] {
         let text = asking().replace(from, to);
         assert_ne!(text, asking());

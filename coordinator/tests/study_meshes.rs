@@ -132,11 +132,23 @@ fn meshes_that_are_open_inverted_or_of_another_unit_are_refused_with_their_file(
         assert!(inverted.contains("point inward where triangle 0 is"), "{inverted}");
         let twisted = said(ending, write, MESHES, |(_, triangles)| triangles[7].swap(0, 1));
         assert!(twisted.contains("7 of the surface have opposite normals"), "{twisted}");
+        let twice = said(ending, write, MESHES, |(_, triangles)| triangles.push(triangles[7]));
+        assert!(twice.contains("triangles 7 and 576 of the surface have the same vertices"), "{twice}");
         let larger = said(ending, write, MESHES, |(vertices, _)| {
             vertices.iter_mut().flatten().for_each(|x| *x *= 1000.0);
         });
         assert!(larger.starts_with("study.toml:") && larger.contains("the same unit"), "{larger}");
-        assert!(larger.contains("`meshes.csv` at time 0 is 1"), "{larger}");
+        assert!(larger.contains("`meshes.csv` at time 0 has a radius of 1"), "{larger}");
+        // The vessel reaches beyond the nodes in either unit: only its width tells millimetres from centimetres.
+        let millimetres = said(ending, write, MESHES, |(vertices, _)| {
+            vertices.iter_mut().flatten().for_each(|x| *x *= 10.0);
+        });
+        let told = [
+            "nodes at rest of `nodes.csv` have 1.0",
+            "are those of mm",
+            "is in cm: multiply its points by 0.1",
+        ];
+        assert!(told.iter().all(|words| millimetres.contains(words)), "{millimetres}");
         let smaller = said(ending, write, MESHES, |(vertices, _)| {
             vertices.iter_mut().flatten().for_each(|x| *x *= 0.001);
         });
@@ -148,11 +160,9 @@ fn meshes_that_are_open_inverted_or_of_another_unit_are_refused_with_their_file(
 
 #[test]
 fn profiles_of_another_unit_are_refused() {
-    for (factor, word) in [
-        (10.0, "away from the nearest node"),
-        (1000.0, "away from the nearest node"),
-        (0.001, "the same unit"),
-    ] {
+    for (factor, word) in
+        [(10.0, "multiply its points by 0.1"), (1000.0, "the same unit"), (0.001, "the same unit")]
+    {
         let scaled = |line: &str| {
             let parts: Vec<f64> = line.split(',').map(|x| x.parse().unwrap()).collect();
             format!("{},{:?},{:?}", parts[0], factor * parts[1], factor * parts[2])

@@ -81,6 +81,37 @@ fn a_smooth_valve_tends_to_the_sharp_one() {
 }
 
 #[test]
+fn a_valve_that_shuts_tightly_before_an_inertance_is_run_and_lets_nothing_back() {
+    // A ventricle, the aortic valve with the inertance of its blood, the aorta and the body.
+    let aorta = |closed: f64, inertance: f64| {
+        let setup = network(
+            json!({ "elements": [
+                { "name": "heart", "kind": "pressure", "to": "lv", "input": "pressure" },
+                { "name": "valve", "kind": "diode", "from": "lv", "to": "root", "open": 0.01, "closed": closed },
+                { "name": "blood", "kind": "L", "from": "root", "to": "aorta", "value": inertance },
+                { "name": "wall", "kind": "C", "from": "aorta", "value": 0.1, "initial": 80.0 },
+                { "name": "body", "kind": "rcr", "from": "aorta", "proximal": 0.05, "compliance": 1.3, "distal": 1.0 },
+            ]}),
+            &[],
+        );
+        let squeeze = |t: f64| {
+            let phase = t.rem_euclid(0.8);
+            5.0 + if phase < 0.35 { 120.0 * (PI * phase / 0.35).sin().powi(2) } else { 0.0 }
+        };
+        let times = grid(800, 1.6);
+        simulate(&setup, &times, vec![signal(&times, squeeze)])["p_aorta"].clone()
+    };
+    for inertance in [5e-4, 2e-3] {
+        let leaking = aorta(1e4, inertance);
+        for closed in [1e5, 1e6] {
+            // 120 mmHg back through 1e4 for 1.6 s are 0.02 ml, in a compliance of 1.4.
+            let off = common::largest_difference(&aorta(closed, inertance), &leaking);
+            assert!(off < 0.02, "{closed:e} before {inertance:e}: {off}");
+        }
+    }
+}
+
+#[test]
 fn a_quadratic_loss_at_rest_balances_inflow_and_pressure_drop() {
     let (kv, kq, rd) = (0.05, 2e-3, 0.9);
     let setup = network(

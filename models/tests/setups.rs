@@ -3,8 +3,8 @@
 mod common;
 
 use common::setup;
-use starlings_models::equations::{EquationsDef, StateDef};
-use starlings_models::{BuildSetup, ModelDef, Setup, SetupError};
+use starlings_models::equations::{EquationsDef, OutputDef, StateDef};
+use starlings_models::{BuildSetup, Forward, ModelDef, Setup, SetupError, Window};
 
 fn refused(change: impl FnOnce(&mut Setup)) -> SetupError {
     let (mut setup, _) = setup("windkessel-3");
@@ -134,6 +134,31 @@ fn equations_have_no_layout() {
     model.layout = Some(serde_json::json!({ "cells": 3 }));
     let error = build(&model).expect_err("a layout");
     assert!(error.to_string().contains("model `equations` has no layout"), "{error}");
+}
+
+#[test]
+fn an_output_that_is_no_number_fails_the_runs_that_record_it_and_no_others() {
+    let state = StateDef {
+        name: "x".to_owned(),
+        initial: "1".to_owned(),
+        rate: vec![("x".to_owned(), "-x".to_owned())],
+        ..StateDef::default()
+    };
+    let output = |name: &str, value: &str| OutputDef {
+        name: name.to_owned(),
+        value: value.to_owned(),
+        ..OutputDef::default()
+    };
+    let outputs = vec![output("level", "x"), output("lost", "log(x - 2)")];
+    let equations = EquationsDef { states: vec![state], outputs, ..EquationsDef::default() };
+    let model = ModelDef { kind: "equations".to_owned(), equations: Some(equations), ..ModelDef::default() };
+    let ran = |output: &str| {
+        let setup = Setup { model: model.clone(), outputs: vec![output.to_owned()], ..Setup::default() };
+        let window = Window::free(0.0, vec![0.0, 1.0], 1, Vec::new());
+        setup.build().unwrap().run(&common::job(&window, &[])).map_err(|error| error.to_string())
+    };
+    assert_eq!(ran("lost").unwrap_err(), "output `lost` is not a finite number at t = 0");
+    assert!(ran("level").is_ok_and(|prediction| prediction.outputs[0] > 0.9));
 }
 
 #[test]

@@ -42,5 +42,5 @@ pub fn import(file: &Path, out: &Path, host: &SolverHost) -> Result<Draft, Draft
             Err(format!("the name does not say what it is: give {known}"))
         }
     };
-    write::write(&plan.map_err(refuse)?, out, host)
+    write::write(file, &plan.map_err(refuse)?, out, host)
 }

@@ -4,7 +4,7 @@
 //! Bands are central, of 95 %, at each time by itself; errors of a measurement are not in them. Bands of measured outputs are in
 //! [`crate::predictive`], and what comes after a record in [`crate::forecast`]. Next files to read: [`members`], then [`result`].
 
-mod members;
+pub(crate) mod members;
 pub mod result;
 mod table;
 pub(crate) mod times;

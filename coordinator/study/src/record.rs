@@ -19,6 +19,7 @@ mod shapes;
 mod start;
 mod surface;
 mod surface_files;
+mod surface_place;
 mod training;
 
 use std::collections::BTreeMap;

@@ -1,18 +1,18 @@
 //! One trial run of every record at the prior median: whether the model runs where the study starts.
 //!
 //! It is made in this process, or by the workers where nothing of the model may run here or its states are large. Next files to read:
-//! [`mod@dry_run`], which makes the runs of a fit, and [`on_fleet`].
+//! [`mod@dry_run`], which makes the runs of a fit, [`mod@asked`], which asks for what `[predict]` names, and [`on_fleet`].
 
+mod asked;
 pub mod dry_run;
 pub mod on_fleet;
+mod remedy;
 
 use std::sync::Arc;
 
 use starlings_fleet::{Held, ProtocolError, returns, travels};
 use starlings_models::external::table::foreign_bytes;
-use starlings_models::{
-    Forward, Job, ModelFailure, ParticleError, Prediction, SOLVER, SetupError, Stop, Until, Window,
-};
+use starlings_models::{Forward, Job, ParticleError, Prediction, SOLVER, SetupError, Stop, Until, Window};
 use starlings_proto::spent::spent;
 
 use super::{Study, posterior};
@@ -66,6 +66,21 @@ pub enum TrialError {
         /// Why it failed.
         source: ParticleError,
     },
+    /// What the study measures runs, and what it predicts does not.
+    #[error(
+        "{outputs} of `[predict]` cannot be predicted: a run over record `{record}` at the prior median fails that asks for nothing \
+         else ({values}): take out of `outputs` in `[predict]` what the model does not give, or make it give that: {source}"
+    )]
+    Predict {
+        /// What is predicted, in quotes.
+        outputs: String,
+        /// Record name.
+        record: String,
+        /// The values it was run with.
+        values: String,
+        /// Why it failed.
+        source: ParticleError,
+    },
     /// The numbers are no table of 64-bit floats with a row per time.
     #[error(
         "the answer of the model on record `{record}` is no table with a row per time: {what}; `starlings conformance` tells more"
@@ -89,13 +104,15 @@ pub enum TrialError {
     },
     /// Model and data are so far apart that the square of their difference is no number.
     #[error(
-        "`{output}` of record `{record}` and its prediction at the prior median are out of all proportion: check units, and values that are codes for missing ones"
+        "`{output}` of record `{record}` and its prediction at the prior median are out of all proportion: {remedy}"
     )]
     Misfit {
         /// Record name.
         record: String,
         /// Output name.
         output: String,
+        /// What to do.
+        remedy: String,
     },
 }
 
@@ -141,7 +158,7 @@ fn trial_by(study: &Study, model: &dyn Runner) -> Result<Vec<TrialChannel>, Tria
         let ran = run(model, index, &window, &theta, None);
         let mut prediction = ran.map_err(|fault| match fault {
             Fault::Run(source) => {
-                let (values, remedy) = (named(study, &theta), remedy(&source, &window));
+                let (values, remedy) = (named(study, &theta), remedy::failure(study, &source, &window));
                 TrialError::Model { record: record.name.clone(), values, source, remedy }
             }
             Fault::Travel(source) => TrialError::Travel { record: record.name.clone(), source },
@@ -161,7 +178,7 @@ fn trial_by(study: &Study, model: &dyn Runner) -> Result<Vec<TrialChannel>, Tria
             let sum: f64 = residuals.iter().map(|r| r * r).sum();
             if !sum.is_finite() {
                 let (record, output) = (record.name.clone(), channel.output.clone());
-                return Err(TrialError::Misfit { record, output });
+                return Err(TrialError::Misfit { record, output, remedy: remedy::misfit(study) });
             }
             channels.push(TrialChannel {
                 record: record.name.clone(),
@@ -215,22 +232,4 @@ pub(super) fn named(study: &Study, theta: &[f64]) -> String {
     let pairs =
         study.setup.parameters.iter().zip(theta).map(|(name, value)| format!("{name} = {}", short(value)));
     pairs.collect::<Vec<_>>().join(", ")
-}
-
-/// What to do about a failure; where steps were too many, with how many there would be.
-fn remedy(error: &ParticleError, window: &Window) -> String {
-    let ParticleError::Model(ModelFailure::TooManySteps { time, limit }) = error else {
-        return "check constants, priors and inputs".to_owned();
-    };
-    let end = window.times.last().copied().unwrap_or(window.start);
-    let done = (time - window.start) / (end - window.start);
-    let all = if done > 0.0 {
-        format!("to t = {end} there would be about {:.0e}", *limit as f64 / done)
-    } else {
-        format!("to t = {end} there would be many times as many")
-    };
-    format!(
-        "{all}: a `step` of the model, a time constant or a tolerance is too short for the record; change it, or allow more \
-         with `max_steps` in `[model]`"
-    )
 }

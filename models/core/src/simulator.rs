@@ -118,15 +118,22 @@ impl Simulator {
         past.advance(&*self.model, segment, theta, x)
     }
 
-    /// The first quantity that is not finite, as an error. A wrong input is named before what it spoils.
+    /// The first quantity that is not finite, as an error, of the outputs those that are recorded. A wrong input is named before what it
+    /// spoils.
     fn check_finite(&self, t: f64, u: &[f64], x: &[f64], y: &[f64]) -> Result<(), ModelFailure> {
-        if x.iter().chain(y).all(|value| value.is_finite()) {
+        let recorded = self.rows.iter().filter_map(|row| match *row {
+            Row::Output(i) => y.get(i),
+            Row::State(_) => None,
+        });
+        if x.iter().chain(recorded).all(|value| value.is_finite()) {
             return Ok(());
         }
         let spec = self.spec();
         let lists = [("input", &spec.inputs, u), ("state", &spec.states, x), ("output", &spec.outputs, y)];
         let found = lists.iter().find_map(|(what, list, values)| {
-            let at = values.iter().position(|value| !value.is_finite())?;
+            let is_recorded = |i: usize| *what != "output" || self.rows.contains(&Row::Output(i));
+            let mut at = values.iter().enumerate();
+            let (at, _) = at.find(|(i, value)| !value.is_finite() && is_recorded(*i))?;
             Some(format!("{what} `{}`", Spec::component(list, at)))
         });
         Err(ModelFailure::NotFinite { what: found.unwrap_or_default(), time: t })

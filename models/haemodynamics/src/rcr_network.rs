@@ -65,7 +65,8 @@ enum Way {
     Exact,
     /// In implicit steps.
     Implicit,
-    /// In steps that end where a sharp valve opens or closes; beside chambers the control of the steps is left to find it.
+    /// In steps that end where a sharp valve opens or closes, and where none does in implicit ones; beside chambers the control of the
+    /// steps is left to find it.
     Events,
 }
 
@@ -144,7 +145,14 @@ impl RcrNetwork {
         x: &mut [f64],
     ) -> Result<(), ModelFailure> {
         if self.way == Way::Events {
-            return advance_by(self, self.solver(), segment, theta, x);
+            let before = x.to_vec();
+            match advance_by(self, self.solver(), segment, theta, x) {
+                // A shut valve behind an inertance is so stiff that steps up to its kink may find none that ends there.
+                Err(ModelFailure::NotFinite { .. } | ModelFailure::StepTooSmall { .. }) => {
+                    x.copy_from_slice(&before);
+                }
+                done => return done,
+            }
         }
         let length = segment.t1 - segment.t0;
         let end: Vec<f64> = segment.u0.iter().zip(segment.slope).map(|(u, s)| u + s * length).collect();

@@ -62,6 +62,7 @@ struct Parts {
 
 impl Parts {
     fn new(file: &File) -> Result<Self, String> {
+        once_each(&file.network)?;
         let (inlet, outlets) = ends(&file.network)?;
         let mut parts = Self {
             segments: String::new(),
@@ -222,6 +223,19 @@ fn behind(vessels: &[Vessel]) -> Result<f64, String> {
             other.label, other.Pout, first.label, first.Pout
         )),
     }
+}
+
+/// Refuses vessels of one label.
+fn once_each(vessels: &[Vessel]) -> Result<(), String> {
+    for (i, vessel) in vessels.iter().enumerate() {
+        if let Some(first) = vessels[..i].iter().position(|other| other.label == vessel.label) {
+            return Err(format!(
+                "network[{i}]: the label `{}` is that of network[{first}] as well: give each vessel its own",
+                vessel.label
+            ));
+        }
+    }
+    Ok(())
 }
 
 /// The node at which the flow enters, and those at which it leaves.

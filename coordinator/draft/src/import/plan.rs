@@ -74,6 +74,10 @@ pub(super) struct Omission {
     pub(super) rate: f64,
     /// What it is.
     pub(super) what: String,
+    /// Its value, below zero.
+    pub(super) value: f64,
+    /// Where it stands in the file.
+    pub(super) place: String,
 }
 
 impl Course {

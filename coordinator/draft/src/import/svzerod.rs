@@ -13,6 +13,7 @@ mod initial;
 mod junctions;
 mod kind;
 mod layout;
+mod names;
 mod network;
 mod outlets;
 mod signal;

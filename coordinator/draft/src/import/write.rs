@@ -20,13 +20,13 @@ const MOST_OMITTED: f64 = 0.05;
 /// Numbers of the predictions at most.
 const MOST_NUMBERS: usize = 20_000_000;
 
-/// Writes the study of a plan into a new folder.
-pub(super) fn write(plan: &Plan, out: &Path, host: &SolverHost) -> Result<Draft, DraftError> {
+/// Writes the study of a plan, read from a file, into a new folder.
+pub(super) fn write(file: &Path, plan: &Plan, out: &Path, host: &SolverHost) -> Result<Draft, DraftError> {
     if out.exists() {
         return Err(DraftError::Taken(out.to_owned()));
     }
     std::fs::create_dir_all(out).map_err(|error| DraftError::Write { file: out.to_owned(), error })?;
-    let written = Folder { plan, out, host }.fill();
+    let written = Folder { file, plan, out, host }.fill();
     if written.is_err() {
         // What is half written would be taken for a study.
         let _ = std::fs::remove_dir_all(out);
@@ -35,6 +35,8 @@ pub(super) fn write(plan: &Plan, out: &Path, host: &SolverHost) -> Result<Draft,
 }
 
 struct Folder<'a> {
+    /// Where the plan is from.
+    file: &'a Path,
     plan: &'a Plan,
     out: &'a Path,
     host: &'a SolverHost,
@@ -110,16 +112,18 @@ impl Folder<'_> {
         let tell = |omission: &Omission| {
             let values = column(recording, &omission.output).map_or(&[][..], Vec::as_slice);
             let part = omission.rate * values.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
-            let text = format!(
-                "{} is left out: at most {:.2} % of the resistance there",
-                omission.what,
-                100.0 * part
-            );
+            let Omission { what, value, place, .. } = omission;
+            let (percent, most) = (100.0 * part, 100.0 * MOST_OMITTED);
             if part <= MOST_OMITTED {
-                return Ok(text);
+                return Ok(format!(
+                    "{place}: {what}, {value}, which is below zero, is left out: at most {percent:.2} % of the resistance there"
+                ));
             }
-            let most = 100.0 * MOST_OMITTED;
-            Err(DraftError::file(self.out, format!("{text}, which is more than {most} %; give zero or more")))
+            let message = format!(
+                "{place}: {what} is {value}, below zero, and takes up to {percent:.2} % of the resistance there: `rcr-network` has none \
+                 below zero, and no more than {most} % is left out; give zero or more"
+            );
+            Err(DraftError::file(self.file, message))
         };
         self.plan.omissions.iter().map(tell).collect()
     }

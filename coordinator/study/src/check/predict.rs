@@ -5,7 +5,7 @@
 use starlings_models::Spec;
 
 use crate::checked::{PredictChoice, Record};
-use crate::field::components;
+use crate::field::{component_of, components};
 use crate::file::predict::PredictSection;
 use crate::predicted::times::times_of;
 use crate::problem::Source;
@@ -52,6 +52,11 @@ fn outputs(source: &Source, section: &PredictSection, spec: &Spec) -> Vec<String
         let named = match Spec::range_of(&spec.outputs, text) {
             Some(range) => components(&spec.outputs)[range].to_vec(),
             None if scalars().any(|state| state.name == *text) => vec![text.clone()],
+            None if components_of(spec, text).is_some() => {
+                let message = format!("`{text}` is beyond its field");
+                source.report_with(name.span(), message, components_of(spec, text).unwrap_or_default());
+                continue;
+            }
             None => {
                 let valid: Vec<String> =
                     spec.outputs.iter().chain(scalars()).map(|q| q.name.clone()).collect();
@@ -69,6 +74,13 @@ fn outputs(source: &Source, section: &PredictSection, spec: &Spec) -> Vec<String
         found.extend(named);
     }
     found
+}
+
+/// Which components the field has that a name speaks of.
+fn components_of(spec: &Spec, name: &str) -> Option<String> {
+    let (field, _) = component_of(name)?;
+    let size = spec.outputs.iter().find(|q| q.name == field && q.size > 1)?.size;
+    Some(format!("`{field}` has the components 0 to {}", size - 1))
 }
 
 /// Refuses more numbers than there is room for, before times are made.
@@ -89,5 +101,20 @@ fn room(source: &Source, section: &PredictSection, choice: &PredictChoice, recor
         source.report_with(section.span.clone(), message, help);
     } else if let Some(record) = records.iter().find(|record| times_of(record, choice.step).is_empty()) {
         source.report(section.span.clone(), format!("record `{}` has no time to predict at", record.name));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use starlings_models::{Quantity, Spec};
+
+    use super::components_of;
+
+    #[test]
+    fn a_component_beyond_its_field_is_told_how_many_there_are() {
+        let stress = Quantity { size: 15, ..Quantity::new("stress", "Pa") };
+        let spec = Spec { outputs: vec![Quantity::new("flow", ""), stress], ..Spec::default() };
+        let told = ["stress[15]", "stress", "flow[2]", "strain[1]"].map(|name| components_of(&spec, name));
+        assert_eq!(told, [Some("`stress` has the components 0 to 14".to_owned()), None, None, None]);
     }
 }

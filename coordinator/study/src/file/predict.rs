@@ -25,6 +25,10 @@ pub(crate) fn read(root: &Table<'_>) -> PredictSection {
     if t.get("outputs").is_none() {
         t.missing("outputs", "names of outputs or scalar states, such as `outputs = [\"pressure\"]`");
     }
+    t.empty(
+        "outputs",
+        "name outputs or scalar states, such as `outputs = [\"pressure\"]`, or leave out `[predict]`",
+    );
     PredictSection {
         span: t.span.clone(),
         outputs: t.texts("outputs"),

@@ -86,6 +86,14 @@ impl<'a> Table<'a> {
         }
     }
 
+    /// Reports that a list, which must name something, names nothing.
+    pub(crate) fn empty(&self, key: &str, help: &str) {
+        let Some(node) = self.get(key) else { return };
+        if node.get_ref().as_array().is_some_and(|list| list.is_empty()) {
+            self.source.report_with(node.span(), format!("`{key}` of {} names nothing", self.name), help);
+        }
+    }
+
     /// A text.
     pub(crate) fn text(&self, key: &str) -> Option<Spanned<String>> {
         text(self.source, self.get(key)?, &format!("`{key}`"))

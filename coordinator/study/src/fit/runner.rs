@@ -185,7 +185,7 @@ impl<'a> EnsembleRunner<'a> {
         Ok(results)
     }
 
-    /// Counts an outcome and keeps its row.
+    /// Counts an outcome, keeps its row, and learns where runs fail.
     fn note(
         &mut self,
         at: AnalysisIndex,
@@ -194,6 +194,13 @@ impl<'a> EnsembleRunner<'a> {
         values: &[f64],
         outcome: &Outcome<Held>,
     ) {
+        self.count(at, record, particle, outcome);
+        let failure = outcome.result.as_ref().err().map(ToString::to_string);
+        self.failures.learn(values, failure.as_deref());
+    }
+
+    /// Counts an outcome and keeps its row.
+    fn count(&mut self, at: AnalysisIndex, record: usize, particle: usize, outcome: &Outcome<Held>) {
         self.rows.push(self.row(at, record, particle, outcome));
         // A timeout that is repeated from the store has no worker.
         if !outcome.worker.is_empty() && !self.workers.contains(&outcome.worker) {
@@ -201,8 +208,6 @@ impl<'a> EnsembleRunner<'a> {
         }
         self.counts.retried += u64::from(outcome.attempts.saturating_sub(1));
         self.counts.failed += u64::from(outcome.result.is_err());
-        let failure = outcome.result.as_ref().err().map(ToString::to_string);
-        self.failures.learn(values, failure.as_deref());
     }
 
     /// Whether the runs for this analysis predict derivatives beside the outputs.

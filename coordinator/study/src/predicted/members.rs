@@ -5,7 +5,7 @@
 use std::sync::Arc;
 
 use starlings_estimators::Gaussian;
-use starlings_models::{BuildSetup, Job, ObserverDef, Window};
+use starlings_models::{BuildSetup, Job, ObserverDef, Setup, Window};
 
 use super::times::times_of;
 use super::{PredictedCourse, PredictedOutput, Predictions};
@@ -29,14 +29,10 @@ pub(super) struct Members {
 /// When the fleet fails as a whole, or refuses the outputs.
 pub(super) fn run(runner: &mut EnsembleRunner<'_>, posterior: &Gaussian) -> Result<Vec<Members>, RunError> {
     let study = runner.study();
-    let mut setup = study.setup.clone();
-    setup.observer = ObserverDef::default();
-    setup.noise = study.setup.is_noisy().then_some(study.seed);
-    setup.outputs.clone_from(&study.predict.outputs);
+    let setup = setup_of(study);
     let members = drawn(posterior, study.predict.members, study.seed);
-    let step = study.predict.step.filter(|_| !study.whole_answers);
     let windows: Vec<Arc<Window>> =
-        study.records.iter().map(|record| Arc::new(window(study, times_of(record, step), record))).collect();
+        (0..study.records.len()).map(|record| Arc::new(window_of(study, record))).collect();
     let job = |(particle, record): (usize, usize)| Job {
         particle: particle as u32,
         record: record as u32,
@@ -61,9 +57,21 @@ pub(super) fn run(runner: &mut EnsembleRunner<'_>, posterior: &Gaussian) -> Resu
     Ok(windows.iter().enumerate().map(of_record).collect())
 }
 
-/// A record from its start, without any observed value.
-fn window(study: &Study, times: Vec<f64>, record: &crate::Record) -> Window {
-    Window::free(record.start, times, study.predict.outputs.len(), record.inputs.clone())
+/// What the runs are made with: the study's model, free, with the outputs that are predicted.
+pub(crate) fn setup_of(study: &Study) -> Setup {
+    let mut setup = study.setup.clone();
+    setup.observer = ObserverDef::default();
+    setup.noise = study.setup.is_noisy().then_some(study.seed);
+    setup.outputs.clone_from(&study.predict.outputs);
+    setup
+}
+
+/// A record from its start, without any observed value, at the times of the predictions.
+pub(crate) fn window_of(study: &Study, record: usize) -> Window {
+    let step = study.predict.step.filter(|_| !study.whole_answers);
+    let of_record = &study.records[record];
+    let times = times_of(of_record, step);
+    Window::free(of_record.start, times, study.predict.outputs.len(), of_record.inputs.clone())
 }
 
 impl Members {

@@ -1,6 +1,6 @@
 //! Channels that were measured as registered surfaces: a surface per time, and where the model's nodes are without displacement.
 //!
-//! What is compared is in [`crate::surfaces`]. Next files to read: [`super::surface_files`], [`super::shapes`].
+//! What is compared is in [`crate::surfaces`]. Next files to read: [`super::surface_place`], [`super::surface_files`], [`super::shapes`].
 
 use std::sync::Arc;
 
@@ -9,12 +9,12 @@ use starlings_models::{Role, Spec};
 use super::Context;
 use super::noise::unusable;
 use super::reader::{ChannelReader, measured_somewhere};
-use super::shapes::{NodeAtRest, Surfaces};
+use super::shapes::Surfaces;
 use super::surface_files::SurfaceFiles;
 use crate::checked::Channel;
 use crate::file::{ChannelSection, SurfaceSection};
 use crate::problem::quoted_list;
-use crate::surfaces::{Node, Shape, Shapes, length};
+use crate::surfaces::Node;
 
 impl ChannelReader<'_> {
     /// The channels of a surface, one per node; `None` when a problem was reported.
@@ -39,7 +39,7 @@ impl ChannelReader<'_> {
         };
         let shapes = Arc::new(with_ends.read()?);
         let places = with_ends.rest(&files.rest, n, output)?;
-        self.in_place(surface, &shapes, &places)?;
+        self.in_place(section, surface, &shapes, &places)?;
         let mut channels = Vec::with_capacity(n);
         for (i, (rest, normal)) in places.into_iter().enumerate() {
             let node = Node { rest, normal, seen: Arc::clone(&shapes) };
@@ -76,39 +76,6 @@ impl ChannelReader<'_> {
         }
         context.warnings.push(self.what_is_compared(section, surface, [channels.len(), n]));
         Some(channels)
-    }
-
-    /// Refuses surfaces that are further away from all nodes at rest than either is long, or than a vessel is wide: they are in another
-    /// unit or another place.
-    fn in_place(&self, surface: &SurfaceSection, shapes: &Arc<Shapes>, places: &[NodeAtRest]) -> Option<()> {
-        let (Some(time), Some(seen)) = (shapes.times.first(), shapes.lengths.first()) else {
-            return Some(());
-        };
-        let distance = |(rest, normal): &NodeAtRest| {
-            Node { rest: *rest, normal: *normal, seen: Arc::clone(shapes) }.distance(*time, 0.0)
-        };
-        let nearest = places.iter().filter_map(distance).map(f64::abs).fold(f64::INFINITY, f64::min);
-        let own = length(places.iter().map(|(rest, _)| *rest));
-        // Two nodes may be closer to each other than a wall moves.
-        let mut far = nearest > *seen || places.len() > 2 && nearest > own;
-        if matches!(shapes.shapes[0], Shape::Profile(_)) {
-            far |= nearest > 2.0 * places.iter().map(|(rest, _)| rest[1]).fold(0.0, f64::max);
-        }
-        if !far {
-            return Some(());
-        }
-        let message = format!(
-            "the surface of `{}` at time {time} is {nearest:.4} away from the nearest node at rest; it is {seen:.4} long, the nodes \
-             reach over {own:.4}",
-            surface.file.get_ref()
-        );
-        let help = format!(
-            "surfaces and the nodes of `{}` must lie in the same place, in the same unit: numbers in mm are 10 times those in cm, 1000 \
-             times those in m",
-            surface.rest.get_ref()
-        );
-        self.source.report_with(surface.file.span(), message, help);
-        None
     }
 
     /// What a distance to a surface has of the noise across and along the wall: root mean square over the times at which the node is

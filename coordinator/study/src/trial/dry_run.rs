@@ -11,7 +11,8 @@ use starlings_fleet::Held;
 use starlings_models::external::table::is_transposed;
 use starlings_models::{Prediction, Window};
 
-use super::{Fault, Here, Runner, TrialChannel, TrialError, named, run, trial_by};
+use super::{Fault, Here, Runner, TrialChannel, TrialError, asked, named, run, trial_by};
+use crate::predicted::members::setup_of;
 use crate::{Study, posterior};
 
 /// Windows of a record that are run where not all are.
@@ -30,13 +31,16 @@ pub enum Depth {
 /// where the model cannot be run in this process.
 ///
 /// # Errors
-/// As [`super::trial()`], and when a run of the fit fails though the whole record does not.
+/// As [`super::trial()`], and when a run of the fit or of what is predicted fails though the whole record does not.
 pub fn dry_run(study: &mut Study, kind: &Kind, depth: Depth) -> Result<Vec<TrialChannel>, TrialError> {
     if !study.runs_here {
         return Ok(Vec::new());
     }
     let model = study.solver_host.build(&study.setup)?;
     let channels = dry_run_by(study, kind, depth, &Here(&*model))?;
+    if asked::is_more(study) {
+        asked::predictions(study, depth, &Here(&*study.solver_host.build(&setup_of(study))?))?;
+    }
     if kind.has_exact_slopes() {
         let sensitive = study.solver_host.build(&study.with_slopes())?;
         for record in (0..study.records.len()).filter(|record| study.records[*record].is_trained()) {

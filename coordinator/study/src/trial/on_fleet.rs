@@ -8,10 +8,11 @@ use std::sync::{Mutex, PoisonError};
 use serde::{Deserialize, Serialize};
 use starlings_estimators::Kind;
 use starlings_fleet::{Fleet, FleetError, Held, SetupId};
-use starlings_models::{Failure, Job, ParticleError, Prediction};
+use starlings_models::{Failure, Job, ParticleError, Prediction, Setup};
 
 use super::dry_run::{Depth, dry_run_by};
-use super::{Runner, TrialError, trial_by};
+use super::{Runner, TrialError, asked, trial_by};
+use crate::predicted::members::setup_of;
 use crate::store::json::json;
 use crate::store::{Store, StoreError};
 use crate::{Study, check};
@@ -54,10 +55,15 @@ pub fn trial_on_fleet(
         (study.whole_answers, study.warnings) = (found.whole_answers, found.warnings);
         return Ok(());
     }
-    on(study, fleet, |study, model| match kind {
+    let setup = study.setup.clone();
+    on(study, &setup, fleet, |study, model| match kind {
         Some(kind) => dry_run_by(study, kind, Depth::First, model),
         None => trial_by(study, model),
     })??;
+    if kind.is_some() && asked::is_more(study) {
+        let setup = setup_of(study);
+        on(study, &setup, fleet, |study, model| asked::predictions(study, Depth::First, model))??;
+    }
     study.warnings.retain(|warning| !warning.contains(check::UNTRIED));
     if let Some(store) = store {
         let found = Found { whole_answers: study.whole_answers, warnings: study.warnings.clone() };
@@ -71,13 +77,14 @@ fn read(store: &Store) -> Result<Option<Found>, StoreError> {
     text.map(|text| serde_json::from_str(&text).map_err(|e| store.damaged(FOUND, e))).transpose()
 }
 
-/// Runs something with the model of a study as the fleet runs it; the outer error is the fleet's.
+/// Runs something with a model of a study as the fleet runs it; the outer error is the fleet's.
 fn on<T>(
     study: &mut Study,
+    setup: &Setup,
     fleet: &mut (dyn Fleet + Send),
     act: impl FnOnce(&mut Study, &dyn Runner) -> T,
 ) -> Result<T, FleetError> {
-    let setup = fleet.install(&study.setup)?;
+    let setup = fleet.install(setup)?;
     let away = Mutex::new(Away { fleet, failed: None });
     let model = OnFleet { away: &away, setup };
     let done = act(study, &model);

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use super::Foot;
 use super::search::{Nearest, Search};
 use super::topology::{Edge, Edges, checked, edge, sides};
-use super::triangle::{Part, closest};
+use super::triangle::{Part, closest, crossing};
 use super::vector::{cross, dot, minus, norm, plus, times, unit};
 use crate::SetupError;
 
@@ -60,6 +60,24 @@ impl Mesh {
             Part::Corner(i) => self.corners[of[i]],
         };
         Some(Foot::new(&x, point, outward, triangle, open))
+    }
+
+    /// Where a line from `x` goes in and comes out, in lengths of `way`, of the stretch inside that is nearest to `x`; `None` where the
+    /// line leaves by an open end, or meets nothing.
+    pub fn inside(&self, x: [f64; 3], way: [f64; 3]) -> Option<[f64; 2]> {
+        let corners = |t: &[usize; 3]| t.map(|v| self.vertices[v]);
+        let crossing = |(t, normal): (&[usize; 3], &[f64; 3])| {
+            crossing(&corners(t), &x, &way).map(|at| (at, dot(normal, &way) > 0.0))
+        };
+        let mut found: Vec<(f64, bool)> =
+            self.triangles.iter().zip(&self.faces).filter_map(crossing).collect();
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        // Through an edge a line meets two triangles in one way.
+        found.dedup_by_key(|(_, outward)| *outward);
+        let stretches =
+            found.windows(2).filter(|pair| !pair[0].1 && pair[1].1).map(|pair| [pair[0].0, pair[1].0]);
+        let away = |[from, to]: &[f64; 2]| f64::max(0.0, f64::max(*from, -to));
+        stretches.min_by(|a, b| away(a).total_cmp(&away(b)))
     }
 }
 

@@ -42,6 +42,13 @@ pub(super) fn checked(
     for (i, triangle) in triangles.iter().enumerate() {
         for (a, b) in sides(triangle) {
             let at = edges.entry(edge(a, b)).or_default();
+            if let Some(same) = at.iter().find(|t| sorted(triangles[**t]) == sorted(*triangle)) {
+                return refuse(format!(
+                    "triangles {same} and {i} of the surface have the same vertices, {}, {} and {}: the triangle is listed twice, \
+                     remove one",
+                    triangle[0], triangle[1], triangle[2]
+                ));
+            }
             at.push(i);
             if at.len() > 2 {
                 return refuse(format!(
@@ -64,6 +71,12 @@ pub(super) fn checked(
     }
     outward(vertices, triangles, &loops)?;
     Ok(edges)
+}
+
+/// The vertices of a triangle whatever its turn.
+fn sorted(mut triangle: [usize; 3]) -> [usize; 3] {
+    triangle.sort_unstable();
+    triangle
 }
 
 /// The border of the surface as loops of vertices, each in the direction of its triangles.

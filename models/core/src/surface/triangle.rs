@@ -2,7 +2,7 @@
 //!
 //! Next file to read: [`super::mesh`].
 
-use super::vector::{dot, minus, plus, times};
+use super::vector::{cross, dot, minus, plus, times};
 
 /// On which part of the triangle a place lies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,4 +44,16 @@ pub(super) fn closest([a, b, c]: &[[f64; 3]; 3], x: &[f64; 3]) -> ([f64; 3], Par
     }
     let area = of_a + of_b + of_c;
     (plus(a, &plus(&times(&ab, of_b / area), &times(&ac, of_c / area))), Part::Face)
+}
+
+/// How far along a line from `x` a triangle is, in lengths of `way`; `None` where the line passes it by (Möller & Trumbore 1997).
+pub(super) fn crossing([a, b, c]: &[[f64; 3]; 3], x: &[f64; 3], way: &[f64; 3]) -> Option<f64> {
+    let (ab, ac, from_a) = (minus(b, a), minus(c, a), minus(x, a));
+    let across = cross(way, &ac);
+    let volume = dot(&ab, &across);
+    let u = dot(&from_a, &across) / volume;
+    let turned = cross(&from_a, &ab);
+    let v = dot(way, &turned) / volume;
+    // A line in the plane of the triangle has no numbers here.
+    (u >= 0.0 && v >= 0.0 && u + v <= 1.0).then(|| dot(&ac, &turned) / volume)
 }

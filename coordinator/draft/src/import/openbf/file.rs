@@ -102,13 +102,32 @@ pub(super) struct Vessel {
 /// Reads the text of a file.
 pub(super) fn read(text: &str) -> Result<File, String> {
     serde_saphyr::from_str(text).map_err(|error| {
-        let place = error
-            .location()
-            .map(|at| format!("line {}, column {}: ", at.line(), at.column()))
-            .unwrap_or_default();
         let message = error.without_snippet().to_string();
-        old(text).unwrap_or_else(|| format!("{place}{message}"))
+        let said =
+            error.location().map(|at| said(text, (at.line() as usize, at.column() as usize), &message));
+        old(text).or(said).unwrap_or(message)
     })
+}
+
+/// What is wrong at a place, with the place once and with what stands there.
+fn said(text: &str, (line, column): (usize, usize), message: &str) -> String {
+    let message = message.trim_end_matches(&format!(" at line {line}, column {column}"));
+    let indent = |line: &str| line.chars().take_while(|c| c.is_whitespace()).any(|c| c == '\t');
+    if let Some(at) = text.lines().position(indent).filter(|_| message.contains("tab")) {
+        return format!(
+            "line {}: a tab stands before `{}`: YAML takes blanks alone there",
+            at + 1,
+            key(text, at + 1)
+        );
+    }
+    format!("line {line}, column {column}: `{}`: {message}", key(text, line))
+}
+
+/// What stands in a line before its value, else all of the line.
+fn key(text: &str, line: usize) -> &str {
+    let whole = text.lines().nth(line.saturating_sub(1)).unwrap_or_default().trim();
+    let entry = whole.trim_start_matches("- ");
+    entry.split_once(':').map_or(whole, |(key, _)| key.trim())
 }
 
 /// Keys of openBF before its version 1.

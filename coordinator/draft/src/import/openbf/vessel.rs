@@ -81,8 +81,7 @@ impl Vessel {
             return Err(self.lacks("`inlet_impedance_matching`: a proximal resistance that follows the wave"));
         }
         let (Some(proximal), Some(compliance)) = (self.R1, self.Cc) else {
-            let message = "nothing follows it and it has no Windkessel (R1, R2, Cc); an outlet without one is not in `artery-1d`";
-            return Err(self.wrong(message));
+            return Err(self.wrong(&self.without_windkessel()));
         };
         let distal = self.R2.filter(|r| *r != 0.0);
         let alone = distal.is_none();
@@ -103,6 +102,23 @@ impl Vessel {
         }
         let (proximal, distal, compliance) = (1e-5 * proximal, 1e-5 * distal, 1e5 * compliance);
         Ok(Windkessel { proximal, distal, compliance, alone })
+    }
+
+    /// What is missing of the Windkessel behind a vessel that nothing follows.
+    fn without_windkessel(&self) -> String {
+        let keys = [("R1", self.R1), ("R2", self.R2), ("Cc", self.Cc)];
+        let named = |given: bool| -> Vec<&str> {
+            keys.iter().filter(|(_, value)| value.is_some() == given).map(|(key, _)| *key).collect()
+        };
+        if named(true).is_empty() {
+            return "nothing follows it and it has no Windkessel (R1, R2, Cc); an outlet without one is not in `artery-1d`"
+                .to_owned();
+        }
+        format!(
+            "nothing follows it, and of its Windkessel it has {} and not {}: give R1 and Cc, and R2 unless R1 is all of the resistance",
+            named(true).join(" and "),
+            named(false).join(" and ")
+        )
     }
 
     /// ρc/A₀ of its end without load, in Pa s/m³: c² = β/2ρ with β = (4/3) √π E h/√A₀ (Melis 2017).

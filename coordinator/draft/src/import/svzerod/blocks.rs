@@ -10,6 +10,7 @@ use super::activation::Shape;
 use super::file::{Boundary, File, Given, Resistance, typed};
 use super::formula::Formula;
 use super::heart::HeartNodes;
+use super::names;
 use super::network::{GROUND, Kind, Network, Node, Series};
 
 /// Labels of flows and resistances in cgs units.
@@ -38,6 +39,8 @@ pub(super) struct Blocks {
     pub(super) states: BTreeMap<String, String>,
     /// The period that a closed loop gives, and where.
     pub(super) period: Option<(f64, String)>,
+    /// Vessels that are nothing but a joint, with their ends.
+    pub(super) passed: Vec<(String, [Node; 2])>,
     /// Where boundary conditions are.
     places: BTreeMap<String, (Node, Side)>,
 }
@@ -64,8 +67,10 @@ impl Blocks {
             activations: Vec::new(),
             states: BTreeMap::new(),
             period: None,
+            passed: Vec::new(),
             places: BTreeMap::new(),
         };
+        names::check(file)?;
         blocks.vessel_ends(file)?;
         blocks.chambers(file)?;
         for (i, junction) in file.junctions.iter().enumerate() {
@@ -77,6 +82,7 @@ impl Blocks {
         for (i, vessel) in file.vessels.iter().enumerate() {
             blocks.vessel(vessel, &format!("vessels[{i}]"))?;
         }
+        blocks.tell_passed();
         for (i, boundary) in file.boundary_conditions.iter().enumerate() {
             if file.boundary_conditions[..i].iter().any(|other| other.bc_name == boundary.bc_name) {
                 return Err(format!("two boundary conditions are called `{}`", boundary.bc_name));

@@ -32,7 +32,9 @@ impl Blocks {
                 Some(values) => {
                     let node = self.network.node(&format!("{name}_{block}"));
                     let (from, to) = if inlet { (node, centre) } else { (centre, node) };
-                    self.network.series(&format!("{name}_to_{block}"), values, from, to)?;
+                    let between = format!("{name}_to_{block}");
+                    let at = format!("{place}.junction_values");
+                    self.network.series((&between, &at), values, from, to)?;
                     node
                 }
             };

@@ -81,6 +81,11 @@ impl Network {
         &self.nodes[self.root(node)]
     }
 
+    /// The name that a node had, where it is one with another by whose name it goes.
+    pub(super) fn lost(&self, node: Node) -> Option<&str> {
+        (self.root(node) != node).then(|| self.nodes[node].as_str())
+    }
+
     /// Adds an element and gives its name.
     pub(super) fn add(&mut self, wanted: &str, kind: Kind, from: Node, to: Node) -> String {
         let name = self.names.take(wanted);
@@ -100,16 +105,24 @@ impl Network {
 
     /// A resistance, a stenosis and an inertance in series, with a capacitor to the ground between the first two and the last;
     /// what is zero is left out.
-    pub(super) fn series(&mut self, name: &str, values: Series, from: Node, to: Node) -> Result<(), String> {
+    pub(super) fn series(
+        &mut self,
+        (name, place): (&str, &str),
+        values: Series,
+        from: Node,
+        to: Node,
+    ) -> Result<(), String> {
         let Series { resistance, stenosis, capacity, inertance } = values;
         for (what, value) in [("resistance", resistance), ("capacitance", capacity), ("inertance", inertance)]
         {
             if !(value >= 0.0 && value.is_finite()) {
-                return Err(format!("{what} of `{name}` is {value}: give zero or more"));
+                return Err(format!("{place}: {what} of `{name}` is {value}: give zero or more"));
             }
         }
         let given = stenosis;
-        let stenosis = stenosis_of(name, resistance, given)?;
+        let stenosis = stenosis_of(resistance, given).ok_or_else(|| {
+            format!("{place}: the stenosis coefficient of `{name}` is {given}: give zero or more")
+        })?;
         let middle = match (resistance > 0.0 || stenosis > 0.0, inertance > 0.0) {
             (true, true) => self.node(&format!("{name}_mid")),
             (true, false) => to,
@@ -124,11 +137,12 @@ impl Network {
         } else if resistance > 0.0 {
             let element = self.add(name, Kind::Resistance(resistance), from, middle);
             if given < 0.0 {
-                let what = format!("the stenosis coefficient of `{name}`, {given}, which is below zero");
                 self.omissions.push(Omission {
                     output: format!("q_{element}"),
                     rate: -given / resistance,
-                    what,
+                    what: format!("the stenosis coefficient of `{name}`"),
+                    value: given,
+                    place: place.to_owned(),
                 });
             }
         }
@@ -227,13 +241,11 @@ impl Network {
     }
 }
 
-/// The coefficient of a stenosis. Below zero, which fits of geometries give, it is left out and looked at when the model has run.
-fn stenosis_of(name: &str, resistance: f64, value: f64) -> Result<f64, String> {
-    match value {
-        value if value >= 0.0 && value.is_finite() => Ok(value),
-        value if value < 0.0 && value.is_finite() && resistance > 0.0 => Ok(0.0),
-        _ => Err(format!("the stenosis coefficient of `{name}` is {value}: give zero or more")),
-    }
+/// The coefficient of a stenosis, if it is one. Below zero, which fits of geometries give, it is left out and looked at when the
+/// model has run.
+fn stenosis_of(resistance: f64, value: f64) -> Option<f64> {
+    let kept = value >= 0.0 || resistance > 0.0;
+    (value.is_finite() && kept).then(|| value.max(0.0))
 }
 
 /// What stands in a row between two nodes.
@@ -243,4 +255,11 @@ pub(super) struct Series {
     pub(super) stenosis: f64,
     pub(super) capacity: f64,
     pub(super) inertance: f64,
+}
+
+impl Series {
+    /// Whether all of the flow passes without a drop of pressure.
+    pub(super) fn is_nothing(&self) -> bool {
+        [self.resistance, self.stenosis, self.inertance].iter().all(|value| *value == 0.0)
+    }
 }

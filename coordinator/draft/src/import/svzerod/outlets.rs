@@ -44,7 +44,7 @@ impl Blocks {
             // The model's own element has all three.
             let chamber = self.network.node(&format!("{name}_chamber"));
             let series = Series { capacity: C, ..Self::of(Rp, 0.0, 0.0) };
-            self.network.series(&format!("{name}_proximal"), series, node, chamber)?;
+            self.network.series((&format!("{name}_proximal"), place), series, node, chamber)?;
             let end = self.network.constant(name, Pd);
             return self.resistance(place, "Rd", name, Rd, chamber, end, true);
         }

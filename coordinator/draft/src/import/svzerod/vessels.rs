@@ -54,6 +54,33 @@ impl Blocks {
             "BloodVesselCRL" => return Err(format!("{place}: C is {}: give zero or more", values.C)),
             _ => series.capacity = values.C,
         }
-        self.network.series(name, series, from, to)
+        if series.is_nothing() {
+            self.passed.push((name.clone(), [from, to]));
+        }
+        self.network.series((name, &format!("{place}.zero_d_element_values")), series, from, to)
+    }
+
+    /// Says which vessels are nothing but a joint, and which outputs there are not of them.
+    pub(super) fn tell_passed(&mut self) {
+        let mut outputs = Vec::new();
+        for (name, ends) in &self.passed {
+            let nodes = ends.iter().filter_map(|end| self.network.lost(*end)).map(|node| format!("p_{node}"));
+            for output in std::iter::once(format!("q_{name}")).chain(nodes) {
+                if !outputs.contains(&output) {
+                    outputs.push(output);
+                }
+            }
+        }
+        let quoted = |names: &mut dyn Iterator<Item = &String>| {
+            names.map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
+        };
+        if !self.passed.is_empty() {
+            let vessels = quoted(&mut self.passed.iter().map(|(name, _)| name));
+            let (have, their) = if self.passed.len() == 1 { ("has", "its") } else { ("have", "their") };
+            self.network.notes.push(format!(
+                "{vessels} {have} neither a resistance nor an inertance: {their} two ends are one node, and the study has no {}",
+                quoted(&mut outputs.iter())
+            ));
+        }
     }
 }

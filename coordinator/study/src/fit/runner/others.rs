@@ -37,7 +37,8 @@ impl EnsembleRunner<'_> {
         self.gather(at, outcomes, (0..setups.len()).map(|setup| (setup, 0)), theta, windows)
     }
 
-    /// Runs jobs that begin where their records do with another setup, counts and notes them, and returns what each predicts.
+    /// Runs jobs that begin where their records do with another setup, counts and keeps them, and returns what each predicts. How
+    /// they fail is told by whoever asked: it says nothing of the runs of the fit.
     ///
     /// # Errors
     /// When the fleet fails as a whole, or refuses the setup.
@@ -52,7 +53,7 @@ impl EnsembleRunner<'_> {
         let outcomes = self.outcomes(at, jobs.len(), |index| (setup, jobs[index].clone()))?;
         let mut results = Vec::with_capacity(outcomes.len());
         for (job, outcome) in jobs.iter().zip(outcomes) {
-            self.note(at, job.record as usize, job.particle as usize, &job.theta, &outcome);
+            self.count(at, job.record as usize, job.particle as usize, &outcome);
             results.push(outcome.result);
         }
         Ok(results)
