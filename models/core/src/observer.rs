@@ -65,6 +65,12 @@ pub trait Observer: Send + Sync {
     }
 
     /// What its poles stand for where that is not plain, to follow "poles"; `None` where [`Self::feedback`] says all.
+    /// The first output component that shows nothing of the state component which it corrects: neither where runs start nor beside it,
+    /// without inputs or with them. `None` where each shows something.
+    fn blind(&self, _model: &dyn Model, _theta: &[f64]) -> Option<(usize, usize)> {
+        None
+    }
+
     fn note(&self) -> Option<&'static str> {
         None
     }
