@@ -201,7 +201,7 @@ fn checked(
     source.verdict()?;
     scales::check(source, &file, &mut model, (&parameters, &records), solver_host, &mut warnings);
     source.verdict()?;
-    model.setup.periods = periodic::periods(source, &file, &model, &records);
+    model.setup.periods = periodic::periods(source, &file, &model, &records, &mut warnings);
     source.verdict()?;
     check_setup(source, &file, &model.setup, &records)?;
     warnings.extend(model.setup.is_noisy().then(|| NOISE_LEFT_OUT.to_owned()));
