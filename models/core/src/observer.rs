@@ -26,6 +26,7 @@ use crate::setup::ObserverDef;
 use crate::{Model, NativeModels, Spec, nearest};
 use together::Together;
 
+pub use measured::outputs_of;
 pub use together::shared_state;
 
 /// What an observer corrects with: one observation time.
@@ -64,13 +65,13 @@ pub trait Observer: Send + Sync {
         None
     }
 
-    /// What its poles stand for where that is not plain, to follow "poles"; `None` where [`Self::feedback`] says all.
     /// The first output component that shows nothing of the state component which it corrects: neither where runs start nor beside it,
     /// without inputs or with them. `None` where each shows something.
     fn blind(&self, _model: &dyn Model, _theta: &[f64]) -> Option<(usize, usize)> {
         None
     }
 
+    /// What its poles stand for where that is not plain, to follow "poles"; `None` where [`Self::feedback`] says all.
     fn note(&self) -> Option<&'static str> {
         None
     }

@@ -29,8 +29,13 @@ pub(crate) fn observer(
             source.report_with(one.kind.span(), message, "remove it, or give both");
         }
     }
-    let beside = section.beside.iter().map(|other| one_observer(source, other, solver)).collect();
-    ObserverDef { beside, ..one_observer(source, section, solver) }
+    let one = |section_of: &ObserverSection| {
+        let def = one_observer(source, section_of, solver);
+        let of_its_kind = section.all().filter(|other| *other.kind.get_ref() == def.kind).count();
+        ObserverDef { named_only: of_its_kind > 1 && !def.corrects.is_empty(), ..def }
+    };
+    let beside = section.beside.iter().map(one).collect();
+    ObserverDef { beside, ..one(section) }
 }
 
 fn one_observer(source: &Source, section: &ObserverSection, solver: Option<&Description>) -> ObserverDef {
