@@ -14,7 +14,7 @@ use std::time::Instant;
 use nalgebra::DMatrix;
 use serde_json::{Map, Value, json};
 use starlings_coordinator::study::recombine_by;
-use starlings_estimators::{Data, Drift, Filter, Noise, Particles, Points, Root, Roukf, SigmaSet};
+use starlings_estimators::{Data, Filter, Noise, Particles, Points, Root, Roukf, SigmaSet};
 use starlings_models::equations::{EquationsDef, EquationsModel};
 use starlings_models::integrate::{Solver, Tolerance};
 use starlings_models::limits::Limits;
@@ -62,7 +62,7 @@ fn analysis(figures: &mut Map<String, Value>) -> Result<(), Failure> {
     let (p, m) = (22, 100_000);
     let set = SigmaSet::new(Points::Simplex, p)?;
     let r = set.n_particle();
-    let roukf = Roukf { set, root: Root::Symmetric, drift: vec![Drift::None; p] };
+    let roukf = Roukf { set, root: Root::Symmetric };
     let theta = roukf.set.points.clone();
     let z = DMatrix::from_fn(m, r, |i, j| ((i * 31 + j * 17) % 1009) as f64 / 1009.0);
     let values: Vec<f64> = (0..m).map(|i| ((i * 7) % 101) as f64 / 101.0).collect();

@@ -23,7 +23,12 @@ pub(crate) fn load(path: &Path) -> Result<Study, Failure> {
     load_where(path, true)
 }
 
-/// The same; where the runs are made elsewhere, no solver is started on this machine.
+/// The same for the poles of its model.
+pub(crate) fn load_for_poles(path: &Path) -> Result<Study, Failure> {
+    Ok(Study::load_for_poles(path, &host(true))?)
+}
+
+/// A study for runs; where they are made elsewhere, no solver is started on this machine.
 pub(crate) fn load_where(path: &Path, here: bool) -> Result<Study, Failure> {
     Ok(Study::load_with(path, &host(here))?)
 }

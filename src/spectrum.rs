@@ -17,7 +17,7 @@ use starlings_models::spectrum::Decay;
 use crate::console::line;
 use crate::csv_file::{self, StudyLocation};
 use crate::failure::Failure;
-use crate::load::load;
+use crate::load::load_for_poles;
 
 /// Show how the poles of the study's model move with the gain of each observer.
 ///
@@ -68,7 +68,7 @@ fn decay(text: &str) -> Result<Decay, String> {
 /// Examines the observers and writes what was asked for.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     check(args)?;
-    let study = load(&args.study)?;
+    let study = load_for_poles(&args.study)?;
     csv_file::check_outputs(
         &[("--csv", &args.csv), ("--html", &args.html)],
         &study.text,

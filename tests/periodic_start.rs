@@ -131,6 +131,12 @@ fn a_start_that_cannot_be_is_refused_with_its_remedy() {
             &["input `q` of record `beats` ends at 3.2", "first period does at 5"],
         ),
         (start, "start = \"periodic\"\nperiod = 0.0", &["`period` is 0"]),
+        (
+            start,
+            "start = \"periodic\"\nperiod = 0.02",
+            &["a period of 0.02 is far below that of record `beats`", "repeat every 0.8", "whole multiple"],
+        ),
+        (start, "start = \"periodic\"\nperiod = 1e-9", &["is far below that of record `beats`"]),
         (start, "period = 0.8", &["add `start = \"periodic\"`"]),
         (start, "start = \"periodik\"", &["unknown start `periodik`", "did you mean `periodic`?"]),
         (

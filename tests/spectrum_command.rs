@@ -111,6 +111,65 @@ fn observers_that_the_model_cannot_host_are_listed_with_the_reason() {
     assert!(sdf["reason"].as_str().unwrap().contains("models that can host it"), "{sdf}");
 }
 
+/// Each output shows three times as much of the state that the other corrects: an error of opposite signs grows.
+const UNSTABLE: &str = r#"
+[study]
+name = "pair"
+[model]
+kind = "equations"
+outputs = [ { name = "y1", value = "p1 + 3*p2" }, { name = "y2", value = "3*p1 + p2" } ]
+[[model.states]]
+name = "p1"
+initial = 70.0
+rate = "-(p1 - p2)/R1"
+[[model.states]]
+name = "p2"
+initial = 68.0
+rate = "2*((p1 - p2)/R1 - p2)"
+[[parameters]]
+name = "R1"
+prior = { transform = "log", median = 0.3, factor = 1.5 }
+[[observer]]
+kind = "nudging"
+gain = 20.0
+corrects = { y1 = "p1" }
+[[observer]]
+kind = "nudging"
+gain = 12.0
+corrects = { y2 = "p2" }
+[[records]]
+name = "one"
+file = "pair.csv"
+channels = [ { column = "y1", output = "y1", noise = 1.0 }, { column = "y2", output = "y2", noise = 1.0 } ]
+"#;
+
+#[test]
+fn a_pair_that_is_unstable_together_is_shown_with_the_factor_that_is_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("study.toml");
+    std::fs::write(&file, UNSTABLE).unwrap();
+    std::fs::write(folder.path().join("pair.csv"), "time,y1,y2\n0,270,280\n0.01,270,280\n0.02,270,280\n")
+        .unwrap();
+    let (code, stdout, stderr) = output(starlings().arg("spectrum").arg(&file));
+    assert_eq!(code, 0, "{stderr}");
+    for part in
+        ["nudging of y1 + nudging of y2", "unstable at the gains of the study (20.000, 12.000", "is 0.3908"]
+    {
+        assert!(stdout.contains(part), "{part} in {stdout}");
+    }
+    let (code, stdout, _) = output(starlings().arg("spectrum").arg(&file).arg("--json"));
+    assert_eq!(code, 0);
+    let found: Value = serde_json::from_str(&stdout).unwrap();
+    let names: Vec<&Value> = found["observers"].as_array().unwrap().iter().map(|o| &o["name"]).collect();
+    assert_eq!(names, ["nudging of y1 + nudging of y2", "nudging of y1", "nudging of y2"]);
+    // The determinant of A − f Γ, 6.667 + 733.3 f − 1920 f², is zero there.
+    let share = found["stable_share"].as_f64().unwrap();
+    let exact = (2200.0 + (2200.0_f64.powi(2) + 4.0 * 5760.0 * 20.0).sqrt()) / (2.0 * 5760.0);
+    assert!((share - exact).abs() < 1e-7, "{share} {exact}");
+    let (code, _, stderr) = output(starlings().arg("check").arg(&file));
+    assert_eq!(code, 2, "a run of it is refused: {stderr}");
+}
+
 #[test]
 fn wrong_options_are_refused_with_the_remedy() {
     for (arguments, expected) in [

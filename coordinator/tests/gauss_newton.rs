@@ -95,6 +95,29 @@ fn it_finds_the_estimate_and_the_interval_of_the_fit_by_sigma_points() {
 }
 
 #[test]
+fn a_fit_that_took_no_step_says_so_and_what_is_held_fixed_is_told_by_its_name() {
+    for kind in ["gauss-newton", "batch"] {
+        let done = fitted(&format!("kind = \"{kind}\"\nmax_iterations = 1"));
+        assert!(
+            done.warns(&format!("the {kind} fit took no step before its iteration limit")),
+            "{:?}",
+            done.summary.warnings
+        );
+        let done = fitted(&format!("kind = \"{kind}\"\nmax_iterations = 2"));
+        assert!(
+            done.warns(&format!("the {kind} fit stopped at its iteration limit")),
+            "{:?}",
+            done.summary.warnings
+        );
+    }
+    let walks = study("kind = \"gauss-newton\"", RATE);
+    let (before, after) = walks.split_once("[[parameters]]\nname = \"c\"\n").unwrap();
+    let walks = format!("{before}[[parameters]]\nname = \"c\"\nprocess = {{ walk = 0.1 }}\n{after}");
+    let done = run_once(&walks, &recordings());
+    assert!(done.warns("the gauss-newton fit holds c at one value"), "{:?}", done.summary.warnings);
+}
+
+#[test]
 fn an_iteration_makes_one_run_of_each_record() {
     let done = fitted("kind = \"gauss-newton\"");
     let iterations = done.table("analyses", "step").len();
@@ -123,4 +146,8 @@ fn where_there_are_no_derivatives_the_study_is_refused() {
     assert!(said.contains("`spread` belongs to kind = \"batch\""), "{said}");
     let said = refused(&format!("{exact}\npasses = 2"), RATE);
     assert!(said.contains("`passes` belongs to kind = \"roukf\""), "{said}");
+    for key in ["tolerance = 0.1", "max_iterations = 9"] {
+        let said = refused(key, RATE);
+        assert!(said.contains("belongs to kind = \"batch\" or \"gauss-newton\""), "{said}");
+    }
 }

@@ -63,6 +63,22 @@ fn the_gain_is_bounded_by_what_the_output_shows_of_the_state_at_the_prior_median
 }
 
 #[test]
+fn an_output_that_does_not_depend_on_the_state_that_it_corrects_is_refused() {
+    let refused = told(&study("turned = \"v\"", 1.0, 1.0, "")).unwrap();
+    assert!(
+        refused.contains("the output `turned` does not depend on the state `v`, which it is to correct"),
+        "{refused}"
+    );
+    assert!(refused.contains("leave it out of `corrects`"), "{refused}");
+    // A square shows nothing at zero, where this run starts, and a product nothing while its input is off.
+    for value in ["x^2", "x*(1 + t) - x"] {
+        let square = study("turned = \"x\"", 1.0, 1.0, "").replace("\"-x\" }", &format!("\"{value}\" }}"));
+        let told = told(&square.replace("initial = 1.0", "initial = 0.0")).unwrap_or_default();
+        assert!(!told.contains("does not depend"), "{told}");
+    }
+}
+
+#[test]
 fn a_channel_that_is_held_out_corrects_nothing_and_bounds_nothing() {
     let both = "sum = \"x\", turned = \"x\"";
     // Their mean falls as x rises: (0.5 − 1)/2.

@@ -241,7 +241,7 @@ fn observers_that_correct_states_of_their_own_go_together_and_two_of_one_state_a
     let of = truth(Twin::default());
     let file = [("wall.csv", columns(&of, |_| true))];
     let told = problem(&side_by_side(("sdf", 20.0), ("nudging", 5.0)), &file);
-    assert!(told.contains("the observers `sdf` and `nudging` both correct the state `eta[0]`"), "{told}");
+    assert!(told.contains("the observers `sdf` by `displacement` and `nudging` by `displacement` both correct the state `eta[0]`"), "{told}");
     let told = problem(&side_by_side(("sdf", 20.0), ("windkessel", 0.0)), &file);
     assert!(told.contains("an observer of a list has a kind and a gain above zero"), "{told}");
     let done = Case::new(&side_by_side(("sdf", 20.0), ("windkessel", 5.0)), &file).run();

@@ -13,7 +13,7 @@ use crate::{Data, EstimatorError, Root};
 /// The result of one analysis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Analysis {
-    /// Transform T, r x r, drift included: X+ = X- T for states and parameters alike. Every column sums to one; the row
+    /// Transform T, r x r: X+ = X- T for states and parameters alike. Every column sums to one; the row
     /// of a dropped particle is zero, so its column of X- must be finite but does not matter.
     pub transform: DMatrix<f64>,
     /// Innovation, observed minus predicted at the mean, length m, in the unit of each row; NaN = missing.
@@ -30,7 +30,7 @@ pub struct Analysis {
     pub information_lost: f64,
 }
 
-/// Steps 2 to 5, without drift. `predictions` is m x r.
+/// Steps 2 to 5. `predictions` is m x r.
 pub(crate) fn analyse(
     geometry: &Geometry,
     unit_points: &DMatrix<f64>,

@@ -75,7 +75,7 @@ pub fn exchange_prior(
     // The posterior mean is the origin: there the slope of the log-likelihood balances that of the used prior.
     let slope = -y_used.component_mul(&share);
     let p = slope.len();
-    let likelihood = Likelihood { information, slope };
+    let likelihood = Likelihood { information: DMatrix::from_diagonal(&information), slope };
     let before = likelihood.update(&y_used, &DMatrix::identity(p, p))?;
     let after = likelihood.update(&y_wanted, &whiten(&l0)?)?;
     let back = &l * v;
@@ -92,26 +92,28 @@ fn root(g: &Gaussian, what: &'static str) -> Result<Cholesky<f64, Dyn>, Estimato
     g.covariance.clone().cholesky().ok_or(EstimatorError::NotPositiveDefinite { what })
 }
 
-/// exp(slope . y - y . E y / 2), E diagonal.
-struct Likelihood {
-    information: DVector<f64>,
-    slope: DVector<f64>,
+/// exp(slope . y - y . E y / 2).
+pub(crate) struct Likelihood {
+    /// E, p x p, symmetric.
+    pub(crate) information: DMatrix<f64>,
+    /// Length p.
+    pub(crate) slope: DVector<f64>,
 }
 
 /// The posterior under one prior, and the two parts of its log evidence, fit − log_det / 2.
-struct Update {
-    mean: DVector<f64>,
-    factor: DMatrix<f64>,
-    fit: f64,
-    log_det: f64,
+pub(crate) struct Update {
+    pub(crate) mean: DVector<f64>,
+    pub(crate) factor: DMatrix<f64>,
+    pub(crate) fit: f64,
+    pub(crate) log_det: f64,
 }
 
 impl Likelihood {
     /// Under the prior N(m, F F^T).
-    fn update(&self, m: &DVector<f64>, f: &DMatrix<f64>) -> Result<Update, EstimatorError> {
+    pub(crate) fn update(&self, m: &DVector<f64>, f: &DMatrix<f64>) -> Result<Update, EstimatorError> {
         let p = m.len();
-        let em = self.information.component_mul(m);
-        let u = DMatrix::identity(p, p) + f.tr_mul(&(DMatrix::from_diagonal(&self.information) * f));
+        let em = &self.information * m;
+        let u = DMatrix::identity(p, p) + f.tr_mul(&(&self.information * f));
         let u = u.cholesky().ok_or(EstimatorError::NotPositiveDefinite { what: "exchanged posterior" })?;
         let b = f.tr_mul(&(&self.slope - &em));
         let step = u.solve(&b);

@@ -8,7 +8,7 @@ use std::fmt::Debug;
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::{Analysis, Data, EstimatorError, Gaussian, Particles};
+use crate::{Analysis, Data, Drift, EstimatorError, Gaussian, Particles};
 
 /// A filter of p parameters with r particles.
 pub trait Filter: Debug {
@@ -35,13 +35,31 @@ pub trait Filter: Debug {
     ///
     /// # Errors
     /// Wrong lengths, non-finite predictions or data, noise that is not positive, particles that do not span the
-    /// parameters or have no spread for the drift.
+    /// parameters.
     fn analysis(
         &self,
         p: &Particles,
         predictions: &DMatrix<f64>,
         data: &Data<'_>,
     ) -> Result<(Particles, Analysis), EstimatorError>;
+
+    /// The drift of the parameters from one analysis to the next, as the r x r matrix M of X <- X M; `None` when nothing moves.
+    /// `p` are the particles after an analysis, `has_data` says whether it had any.
+    ///
+    /// # Errors
+    /// `Shape` and `DriftOutOfRange` for a bad drift, `NoSpread` for particles that have no spread to drift from.
+    fn drift(
+        &self,
+        p: &Particles,
+        drift: &[Drift],
+        has_data: bool,
+    ) -> Result<Option<DMatrix<f64>>, EstimatorError>;
+
+    /// The directions L of m rows of values of the particles (m x r), m x p: with the parameters as rows L L^T is their covariance.
+    fn directions(&self, p: &Particles, values: &DMatrix<f64>) -> DMatrix<f64>;
+
+    /// A transform X <- X T of these particles in their directions: the mean goes to x + L w, the directions to L C; (w, C).
+    fn reduced(&self, p: &Particles, t: &DMatrix<f64>) -> (DVector<f64>, DMatrix<f64>);
 
     /// Pulls particle `i` to the distance `s` (0 < s <= 1) of its place from the mean: the new particles, and the r x r
     /// matrix that does the same to the states, X <- X M. The other particles do not move.

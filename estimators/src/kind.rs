@@ -5,7 +5,7 @@
 
 use std::fmt;
 
-use crate::{Drift, EstimatorError, Filter, Points, Root};
+use crate::{EstimatorError, Filter, Points, Root};
 
 /// An estimator as a study file names it.
 pub struct Kind {
@@ -49,8 +49,6 @@ pub struct Options {
     pub points: Points,
     /// Root of the posterior covariance.
     pub root: Root,
-    /// Drift of each parameter, length p; empty = none drifts.
-    pub drift: Vec<Drift>,
     /// The study's seed, for a filter that draws its particles.
     pub seed: u64,
 }

@@ -22,6 +22,7 @@ mod error;
 mod exchange;
 mod filter;
 pub mod forecast;
+mod from_start;
 mod gauss_newton;
 mod gaussian;
 mod gram;
@@ -62,6 +63,7 @@ pub use drift::Drift;
 pub use error::EstimatorError;
 pub use exchange::{Exchanged, exchange_prior};
 pub use filter::{Filter, Resampled};
+pub use from_start::FromStart;
 pub use gauss_newton::GAUSS_NEWTON;
 pub use gaussian::Gaussian;
 pub use identifiability::{

@@ -20,7 +20,7 @@ pub static ROUKF: Kind = Kind {
     spread: 0.001,
     form: Form::Windows(|o| {
         let set = SigmaSet::new(o.points, o.n_param)?;
-        Ok(Box::new(Roukf { set, root: o.root, drift: o.drift.clone() }))
+        Ok(Box::new(Roukf { set, root: o.root }))
     }),
 };
 
@@ -41,8 +41,6 @@ pub struct Roukf {
     pub set: SigmaSet,
     /// Root of the posterior covariance.
     pub root: Root,
-    /// Drift of each parameter, length p; empty = none drifts.
-    pub drift: Vec<Drift>,
 }
 
 impl Filter for Roukf {
@@ -62,7 +60,7 @@ impl Filter for Roukf {
 
     fn gaussian(&self, p: &Particles) -> Gaussian {
         let geometry = Geometry::new(&self.set, &p.pull);
-        let l = &p.theta * &geometry.slope;
+        let l = self.directions(p, &p.theta);
         Gaussian { mean: &p.theta * &geometry.mean, covariance: &l * l.transpose() }
     }
 
@@ -129,7 +127,7 @@ impl Filter for Roukf {
     }
 
     /// Without any observation a simplex stays where it is; other sets lose the even part of their spread (they are
-    /// projected on the linear relation, w = 0 and C = 1). Random walks go on, forgetting waits for data.
+    /// projected on the linear relation, w = 0 and C = 1).
     fn analysis(
         &self,
         p: &Particles,
@@ -137,18 +135,35 @@ impl Filter for Roukf {
         data: &Data<'_>,
     ) -> Result<(Particles, Analysis), EstimatorError> {
         self.check(p)?;
-        drift::check(&self.drift, self.set.n_param())?;
         same("rows of the predictions", data.values.len(), predictions.nrows())?;
         same("columns of the predictions", self.set.n_particle(), predictions.ncols())?;
         let geometry = Geometry::new(&self.set, &p.pull);
         self.spanned(p, &geometry)?;
-        let mut analysis = analyse(&geometry, &self.set.points, self.root, predictions, data)?;
-        let mut theta = &p.theta * &analysis.transform;
-        if let Some(moved) = drift::transform(&self.drift, &self.set, &theta, analysis.n_used > 0)? {
-            theta *= &moved;
-            analysis.transform *= moved;
-        }
-        Ok((Particles::whole(theta), analysis))
+        let analysis = analyse(&geometry, &self.set.points, self.root, predictions, data)?;
+        Ok((Particles::whole(&p.theta * &analysis.transform), analysis))
+    }
+
+    /// Random walks go on without any observation, forgetting waits for data.
+    fn drift(
+        &self,
+        p: &Particles,
+        drift: &[Drift],
+        has_data: bool,
+    ) -> Result<Option<DMatrix<f64>>, EstimatorError> {
+        self.check(p)?;
+        drift::check(drift, self.set.n_param())?;
+        drift::transform(drift, &self.set, &p.theta, has_data)
+    }
+
+    fn directions(&self, p: &Particles, values: &DMatrix<f64>) -> DMatrix<f64> {
+        values * Geometry::new(&self.set, &p.pull).slope
+    }
+
+    fn reduced(&self, p: &Particles, t: &DMatrix<f64>) -> (DVector<f64>, DMatrix<f64>) {
+        let points = Geometry::new(&self.set, &p.pull).points * t;
+        let whole = vec![1.0; p.pull.len()];
+        let after = Particles { theta: p.theta.clone(), pull: whole };
+        (&points * &self.set.weights, self.directions(&after, &points))
     }
 }
 

@@ -200,7 +200,7 @@ fn a_posterior_ten_thousand_million_times_sharper_than_its_prior_is_the_closed_f
         let (_, step) = fit(Points::Simplex, &model, &prior, &data);
         assert!(step.converged, "ratio {ratio:e}: step {}", step.step);
         let set = SigmaSet::new(Points::Simplex, 2).unwrap();
-        let roukf = Roukf { set, root: Root::Symmetric, drift: Vec::new() };
+        let roukf = Roukf { set, root: Root::Symmetric };
         let particles = roukf.init(&prior);
         let (after, _) = roukf.analysis(&particles, &(&columns * &particles.theta), &data).unwrap();
         let filtered = roukf.gaussian(&after);

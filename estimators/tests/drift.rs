@@ -27,10 +27,11 @@ fn pair(points: Points, drift: [Drift; 3], values: &[f64]) -> Pair {
     let z = (normal(&mut g, 2, 7) * &states).map(|v| v + 0.1 * v * v);
     let noise = Noise::Diagonal(vec![1.0, 2.0]);
     let data = Data { values, noise: &noise };
-    let still = roukf.analysis(&particles, &z, &data).unwrap().1;
-    let drifting = Roukf { drift: drift.to_vec(), ..roukf.clone() };
-    let (after, moved) = drifting.analysis(&particles, &z, &data).unwrap();
-    assert!(difference(&after.theta, &(&particles.theta * &moved.transform)) < 1e-13, "T holds the drift");
+    let (after, still) = roukf.analysis(&particles, &z, &data).unwrap();
+    let mut moved = still.clone();
+    if let Some(drifted) = roukf.drift(&after, &drift, still.n_used > 0).unwrap() {
+        moved.transform *= drifted;
+    }
     Pair { roukf, theta: particles.theta, states, still, moved }
 }
 
@@ -104,16 +105,15 @@ fn without_data_a_walk_goes_on_and_nothing_is_forgotten() {
 #[test]
 fn a_drift_out_of_range_or_of_the_wrong_number_or_without_spread_is_refused() {
     let refuse = |drift: Vec<Drift>, sd: [f64; 3]| {
-        let roukf = Roukf { drift, ..filter(Points::Simplex, 3, Root::Symmetric) };
+        let roukf = filter(Points::Simplex, 3, Root::Symmetric);
         let particles = roukf.init(&Gaussian::independent(&[0.0; 3], &sd));
-        let data = Data { values: &[0.0], noise: &Noise::Diagonal(vec![1.0]) };
-        roukf.analysis(&particles, &DMatrix::zeros(1, 4), &data).unwrap_err()
+        roukf.drift(&particles, &drift, true).unwrap_err()
     };
     let wrong = |d| refuse(vec![Drift::None, d, Drift::None], SD);
     assert_eq!(wrong(Drift::Forgetting(0.0)), EstimatorError::DriftOutOfRange { parameter: 1, value: 0.0 });
     assert_eq!(wrong(Drift::Forgetting(1.5)), EstimatorError::DriftOutOfRange { parameter: 1, value: 1.5 });
     assert_eq!(wrong(Drift::Walk(-1.0)), EstimatorError::DriftOutOfRange { parameter: 1, value: -1.0 });
-    let short = refuse(vec![Drift::None], SD);
+    let short = refuse(vec![Drift::Walk(0.1)], SD);
     assert_eq!(short, EstimatorError::Shape { what: "drifts", expected: 3, got: 1 });
     let flat = refuse(vec![Drift::Walk(0.1); 3], [1.0, 0.0, 1.0]);
     assert_eq!(flat, EstimatorError::NoSpread { parameter: 1 });

@@ -9,7 +9,7 @@ use starlings_estimators::{Data, Filter, Form, Gaussian, KINDS, Kind, Noise, Opt
 
 /// The filters of the list, made for p parameters.
 fn filters(n_param: usize) -> Vec<(&'static Kind, Box<dyn Filter>)> {
-    let options = Options { n_param, points: Points::Simplex, root: Root::Symmetric, drift: vec![], seed: 7 };
+    let options = Options { n_param, points: Points::Simplex, root: Root::Symmetric, seed: 7 };
     let made = KINDS.iter().filter_map(|kind| match &kind.form {
         Form::Windows(make) => Some((*kind, make(&options).unwrap())),
         Form::WholeRecords(_) => None,

@@ -1,6 +1,7 @@
 //! The spectrum as tables for people and as JSON.
 
 use serde_json::{Value, json};
+use starlings_coordinator::study::Study;
 use starlings_coordinator::study::field::observed_fields;
 use starlings_models::spectrum::{Beyond, ObserverSpectrum};
 
@@ -36,6 +37,7 @@ pub(super) fn as_json(found: &Found<'_>) -> Value {
         "poles": poles.iter().map(|p| [p.re, p.im]).collect::<Vec<_>>(),
         "wanted_max_re": found.spectrum.decay.map(starlings_models::spectrum::Decay::max_re),
         "observers": observers.collect::<Vec<_>>(),
+        "stable_share": found.spectrum.stable_share,
         "refused": found.spectrum.refused.iter().map(|(name, why)| json!({ "name": name, "reason": why })).collect::<Vec<_>>(),
     })
 }
@@ -64,12 +66,28 @@ pub(super) fn text(found: &Found<'_>) -> Result<(), Failure> {
     for (o, note) in found.spectrum.observers.iter().filter_map(|o| Some((o, o.note?))) {
         line(format_args!("  {}: poles {note}", o.name))?;
     }
+    if let Some(share) = found.spectrum.stable_share {
+        line(unstable(study, share))?;
+    }
     if !found.spectrum.refused.is_empty() {
         line("\nnot possible here")?;
     }
     refusals(&found.spectrum.refused)
         .iter()
         .try_for_each(|(names, why)| line(format_args!("  {}: {why}", names.join(", "))))
+}
+
+/// That the study's own observers are unstable together, and at which gains they are not.
+fn unstable(study: &Study, share: f64) -> String {
+    let own = &study.setup.observer;
+    let gains = own.all().map(|def| number(def.gain, None)).collect::<Vec<_>>().join(", ");
+    let remedy = if share > 0.0 {
+        let stable = own.all().map(|def| number(share * def.gain, None)).collect::<Vec<_>>().join(", ");
+        format!("the largest common factor on the gains that is stable is {share:.4} (gains {stable})")
+    } else {
+        "no common factor on the gains is stable".to_owned()
+    };
+    format!("  {}: unstable at the gains of the study ({gains} 1/{}); {remedy}", own.name(), study.time_unit)
 }
 
 /// Observers with the same reason together.

@@ -11,6 +11,7 @@ mod explain;
 mod infer;
 mod initial;
 mod limits;
+mod load;
 mod model;
 mod nudged;
 mod observer;
@@ -33,8 +34,9 @@ mod walks;
 use std::path::Path;
 use std::sync::Arc;
 
-use starlings_models::{BuildSetup, Setup, SolverDef, Spec};
+use starlings_models::{BuildSetup, Setup, Spec};
 
+use self::load::Purpose;
 use self::parameters::initial_medians;
 use self::records::records;
 use self::settings::{estimator, fleet};
@@ -43,10 +45,9 @@ pub(crate) use self::solver::UNTRIED;
 use super::checked::{
     EstimatorChoice, ExplainChoice, FleetChoice, PredictChoice, Record, SpectrumChoice, Study,
 };
-use super::diagnosis::Diagnosis;
 use super::expand;
 use super::file::StudyFile;
-use super::problem::{Problem, Source, StudyError};
+use super::problem::{Source, StudyError};
 use super::solver_host::SolverHost;
 use crate::file::read::read;
 
@@ -54,116 +55,15 @@ use crate::file::read::read;
 const NOISE_LEFT_OUT: &str = "the states' `noise` is left out of the runs of a fit, whose particles follow the rate alone: what the noise \
     did to the recording counts as noise of the channels";
 
-impl Study {
-    /// Reads and checks a study file and its recordings, which stand relative to it.
-    ///
-    /// # Errors
-    /// Everything that is wrong, each with its place and remedy.
-    pub fn load(path: &Path) -> Result<Self, StudyError> {
-        Self::load_with(path, &SolverHost::default())
-    }
-
-    /// Reads and checks a study file where solvers can be started.
-    ///
-    /// # Errors
-    /// As [`Study::load`].
-    pub fn load_with(path: &Path, solver_host: &SolverHost) -> Result<Self, StudyError> {
-        Self::from_text_with(path, &text_of(path)?, solver_host)
-    }
-
-    /// The solver of a study file as the study names it: its recordings are not looked at, and nothing is started.
-    ///
-    /// # Errors
-    /// When the file is no study, its model is no solver, or a file of the solver is missing.
-    pub fn solver_of(path: &Path, solver_host: &SolverHost) -> Result<SolverDef, StudyError> {
-        let text = text_of(path)?;
-        let source = Source::new(path, &text);
-        let file = read(&source, solver_host.adapters())?;
-        source.verdict()?;
-        let own = solver::own(&source, &file);
-        source.verdict()?;
-        own.ok_or_else(|| StudyError { problems: Vec::new() })
-    }
-
-    /// Reads and checks a study file for an inference: its recordings are described in [`Study::infer`] and not read, and parameters
-    /// need no prior.
-    ///
-    /// # Errors
-    /// Everything that is wrong, each with its place and remedy.
-    pub fn load_for_inference(path: &Path) -> Result<Self, StudyError> {
-        infer::study(path, &text_of(path)?)
-    }
-
-    /// The same for the text of a study file that stands, or stood, at `file`.
-    ///
-    /// # Errors
-    /// As [`Study::load_for_inference`].
-    pub fn from_text_for_inference(file: &Path, text: &str) -> Result<Self, StudyError> {
-        infer::study(file, text)
-    }
-
-    /// Reads and checks a study file for a diagnosis: the study as it is, and one for every scenario.
-    ///
-    /// # Errors
-    /// Everything that is wrong, each with its place and remedy; of several scenarios the first that has something.
-    pub fn load_for_diagnosis(path: &Path, solver_host: &SolverHost) -> Result<Diagnosis, StudyError> {
-        diagnose::diagnosis(path, &text_of(path)?, solver_host)
-    }
-
-    /// Whether a study file has a section `[infer]`; a file that cannot be read has none.
-    pub fn asks_to_infer(path: &Path) -> bool {
-        has_section(path, "infer")
-    }
-
-    /// Whether a study file has a section `[diagnose]`; a file that cannot be read has none.
-    pub fn asks_to_diagnose(path: &Path) -> bool {
-        has_section(path, "diagnose")
-    }
-
-    /// Checks the text of a study file that stands, or stood, at `file`.
-    ///
-    /// # Errors
-    /// As [`Study::load`].
-    pub fn from_text(file: &Path, text: &str) -> Result<Self, StudyError> {
-        Self::from_text_with(file, text, &SolverHost::default())
-    }
-
-    /// Checks the text of a study file that stands, or stood, at `file`, where solvers can be started.
-    ///
-    /// # Errors
-    /// As [`Study::load`].
-    pub fn from_text_with(file: &Path, text: &str, solver_host: &SolverHost) -> Result<Self, StudyError> {
-        check(file, text, solver_host)
-    }
-}
-
-fn has_section(path: &Path, name: &str) -> bool {
-    let file = text_of(path).ok().and_then(|text| text.parse::<toml::Table>().ok());
-    file.is_some_and(|file| file.contains_key(name))
-}
-
-fn text_of(path: &Path) -> Result<String, StudyError> {
-    std::fs::read_to_string(path).map_err(|error| {
-        let problem = Problem {
-            message: format!("cannot read the study: {error}"),
-            help: Some("give the path of a study file (TOML)".to_owned()),
-            file: path.to_owned(),
-            source_text: None,
-            span: None,
-        };
-        StudyError { problems: vec![problem] }
-    })
-}
-
-fn check(path: &Path, text: &str, solver_host: &SolverHost) -> Result<Study, StudyError> {
+fn check(path: &Path, text: &str, by: (&SolverHost, Purpose)) -> Result<Study, StudyError> {
     let source = Source::new(path, text);
-    let file = read(&source, solver_host.adapters())?;
+    let file = read(&source, by.0.adapters())?;
     if source.count() > 0 {
         // After a fault of form other checks could be misleading; priors and data files can still be checked.
         survey::survey(&source, &file);
         source.verdict()?;
     }
-    checked(path, &source, file, solver_host)
+    checked(path, &source, file, by)
 }
 
 /// Checks a file that was read without a fault of form.
@@ -171,7 +71,7 @@ fn checked(
     path: &Path,
     source: &Source,
     file: StudyFile,
-    solver_host: &SolverHost,
+    (solver_host, purpose): (&SolverHost, Purpose),
 ) -> Result<Study, StudyError> {
     check_name(source, &file);
     let solver = solver::solver(source, &file, solver_host);
@@ -179,8 +79,8 @@ fn checked(
     let estimator = estimator(source, &file.estimator, described);
     let fleet = fleet(source, &file.fleet);
     let explain = explain::explain(source, &file);
-    let spectrum = spectrum::spectrum(source, &file.spectrum, &file.observer);
     let observer = settings::observer(source, &file.observer, described);
+    let spectrum = spectrum::spectrum(source, &file.spectrum, &observer);
     let model = model::model(source, &file, solver.as_ref());
     // Everything that follows is judged against the model.
     let Some(mut model) = model else { return Err(survey::without_model(source, &file)) };
@@ -201,7 +101,7 @@ fn checked(
     source.verdict()?;
     scales::check(source, &file, &mut model, (&parameters, &records), solver_host, &mut warnings);
     source.verdict()?;
-    model.setup.periods = periodic::periods(source, &file, &model, &records);
+    model.setup.periods = periodic::periods(source, &file, &model, &records, &mut warnings);
     source.verdict()?;
     check_setup(source, &file, &model.setup, &records)?;
     warnings.extend(model.setup.is_noisy().then(|| NOISE_LEFT_OUT.to_owned()));
@@ -227,7 +127,7 @@ fn checked(
     slopes::check(source, kind, &study);
     walks::check(source, &processes, predicted, &study);
     nudged::check(source, &observers, &study);
-    together::check(source, &observers, &study);
+    together::check(source, &observers, &study, purpose);
     source.verdict()?;
     Ok(study)
 }

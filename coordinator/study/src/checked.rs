@@ -236,7 +236,7 @@ impl Study {
     /// What the study's filter is made from, without drift.
     pub fn filter_options(&self) -> Options {
         let (points, root) = (self.estimator.points, self.estimator.root);
-        Options { n_param: self.theta.len(), points, root, drift: Vec::new(), seed: self.seed }
+        Options { n_param: self.theta.len(), points, root, seed: self.seed }
     }
 
     /// Noise sd of each of [`Setup::outputs`] in a record; 1 for an output that the record does not measure, whose rows

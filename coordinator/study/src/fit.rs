@@ -6,6 +6,7 @@
 //! `starlings-estimators`. Next file to read: [`filter`].
 
 pub(crate) mod batch;
+mod drifting;
 mod ensemble;
 pub(crate) mod filter;
 pub(crate) mod free_run;

@@ -40,6 +40,8 @@ pub struct Spectrum {
     pub observers: Vec<ObserverSpectrum>,
     /// Observers that the model cannot host, with the reason; empty where observers were asked for.
     pub refused: Vec<(String, String)>,
+    /// The largest common factor on the gains of the study's own observers that is stable; `None` where they are stable together.
+    pub stable_share: Option<f64>,
 }
 
 /// One listed pole at one gain.
@@ -97,7 +99,9 @@ pub fn examine(study: &Study, wanted: &Wanted) -> Result<Spectrum, ExamineError>
     for (kind, result) in kinds.iter().zip(results) {
         observers.push(result.map_err(|_| ExamineError::Broken(kind.clone()))??);
     }
-    Ok(Spectrum { linearised, decay, listed, observers, refused })
+    let several = !study.setup.observer.beside.is_empty();
+    let stable_share = if several { linearised.stable_share()? } else { None };
+    Ok(Spectrum { linearised, decay, listed, observers, refused, stable_share })
 }
 
 /// The gains that are asked for, else the study's, else a range around the poles.
@@ -126,9 +130,9 @@ fn kinds(
             }
         }
     }
-    for kind in named {
-        if !kinds.contains(kind) {
-            kinds.push(kind.clone());
+    for kind in named.iter().flat_map(|kind| linearised.of_kind(kind)) {
+        if !kinds.contains(&kind) {
+            kinds.push(kind);
         }
     }
     (kinds, refused)

@@ -39,7 +39,7 @@ pub(crate) fn collect(
 ) -> Vec<String> {
     let mut warnings = study.warnings.clone();
     warnings.extend(consistency::nis(fit, residuals));
-    warnings.extend(not_converged(fit));
+    warnings.extend(not_converged(study, fit));
     warnings.extend(drift_ignored(study));
     warnings.extend(consistency::still_moving(study, fit));
     warnings.extend(consistency::free_run(fit, study, predictions));
@@ -53,9 +53,18 @@ pub(crate) fn collect(
     warnings
 }
 
-fn not_converged(fit: &Fit) -> Option<String> {
+fn not_converged(study: &Study, fit: &Fit) -> Option<String> {
+    let kind = study.estimator.kind.name;
     (!fit.converged).then(|| {
-        "the batch fit stopped at its iteration limit before it converged: raise [estimator] max_iterations".to_owned()
+        if fit.posterior.mean == prior(study).mean {
+            return format!(
+                "the {kind} fit took no step before its iteration limit: the estimates are the prior medians, and their intervals belong to \
+                 these. Raise [estimator] max_iterations."
+            );
+        }
+        format!(
+            "the {kind} fit stopped at its iteration limit before it converged: raise [estimator] max_iterations"
+        )
     })
 }
 
@@ -66,8 +75,8 @@ fn drift_ignored(study: &Study) -> Vec<String> {
     drifting
         .map(|t| {
             format!(
-                "the batch fit holds {} at one value for all times although the study lets it drift: use kind = \"roukf\".",
-                t.name
+                "the {} fit holds {} at one value for all times although the study lets it drift: use kind = \"roukf\".",
+                study.estimator.kind.name, t.name
             )
         })
         .collect()

@@ -30,7 +30,7 @@ pub fn uniform(rng: &mut ChaCha8Rng, lo: f64, hi: f64) -> f64 {
 }
 
 pub fn filter(points: Points, p: usize, root: Root) -> Roukf {
-    Roukf { set: SigmaSet::new(points, p).unwrap(), root, drift: vec![] }
+    Roukf { set: SigmaSet::new(points, p).unwrap(), root }
 }
 
 /// centre 1^T + L I.

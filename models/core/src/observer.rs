@@ -26,6 +26,7 @@ use crate::setup::ObserverDef;
 use crate::{Model, NativeModels, Spec, nearest};
 use together::Together;
 
+pub use measured::outputs_of;
 pub use together::shared_state;
 
 /// What an observer corrects with: one observation time.
@@ -61,6 +62,12 @@ pub trait Observer: Send + Sync {
     /// The largest stable gain with observations every `dt`; `None` for a correction that any gain leaves stable. `theta` are
     /// the parameters of `model`.
     fn stable_up_to(&self, _model: &dyn Model, _theta: &[f64], _dt: f64) -> Option<f64> {
+        None
+    }
+
+    /// The first output component that shows nothing of the state component which it corrects: neither where runs start nor beside it,
+    /// without inputs or with them. `None` where each shows something.
+    fn blind(&self, _model: &dyn Model, _theta: &[f64]) -> Option<(usize, usize)> {
         None
     }
 

@@ -44,8 +44,11 @@ pub struct ObserverDef {
     pub kind: String,
     /// Gain in 1/time unit.
     pub gain: f64,
-    /// Output → state that it corrects, where the model does not say so itself.
+    /// Output → state that it corrects; of an output that is named here the model's own pair does not count.
     pub corrects: BTreeMap<String, String>,
+    /// Whether it observes the outputs in `corrects` alone, since another of its kind stands beside it.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub named_only: bool,
     /// Observers that correct other states in the same run.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub beside: Vec<ObserverDef>,
@@ -57,9 +60,20 @@ impl ObserverDef {
         std::iter::once(self).chain(&self.beside)
     }
 
-    /// Its kind, joined with those beside it: `sdf + windkessel`.
+    /// Its kind, joined with those beside it: `sdf + windkessel`, or `nudging of y1 + nudging of y2`.
     pub fn name(&self) -> String {
-        self.all().map(|def| def.kind.as_str()).collect::<Vec<_>>().join(" + ")
+        self.names().join(" + ")
+    }
+
+    /// The names of all: their kinds; where several are of one kind with the outputs in `corrects`, or a number without any.
+    pub fn names(&self) -> Vec<String> {
+        let is_twice = |def: &Self| self.all().filter(|other| other.kind == def.kind).count() > 1;
+        let name = |(k, def): (usize, &Self)| match def.corrects.keys().cloned().collect::<Vec<_>>() {
+            _ if !is_twice(def) => def.kind.clone(),
+            outputs if outputs.is_empty() => format!("{} number {}", def.kind, k + 1),
+            outputs => format!("{} of {}", def.kind, outputs.join(", ")),
+        };
+        self.all().enumerate().map(name).collect()
     }
 
     /// Whether none of them corrects anything.

@@ -42,7 +42,9 @@ fn snapshot(rescued: u64) -> Snapshot {
     let counts = Counts { rescued, ..Counts::default() };
     let figures = Figures { step: 1, n_used: 1, counts, ..Figures::default() };
     let (centre, scale) = (Vec::new(), Vec::new());
-    let estimate = Ensemble { theta: Matrix::default(), centre, scale, cost: None, narrow: 1.0 }.into();
+    let estimate =
+        Ensemble { theta: Matrix::default(), centre, scale, cost: None, narrow: 1.0, from_start: None }
+            .into();
     Snapshot { figures, estimate, states: Vec::new() }
 }
 

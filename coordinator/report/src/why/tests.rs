@@ -56,7 +56,8 @@ fn killed() -> (tempfile::TempDir, RunFolder) {
     let snapshot = || -> Snapshot {
         let figures = Figures { step: 1, n_used: 1, counts: Counts::default(), ..Figures::default() };
         let (centre, scale) = (Vec::new(), Vec::new());
-        let ensemble = Ensemble { theta: Matrix::default(), centre, scale, cost: None, narrow: 1.0 };
+        let ensemble =
+            Ensemble { theta: Matrix::default(), centre, scale, cost: None, narrow: 1.0, from_start: None };
         Snapshot { figures, estimate: ensemble.into(), states: Vec::new() }
     };
     let rows = [

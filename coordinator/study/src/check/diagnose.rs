@@ -8,6 +8,7 @@ use std::path::Path;
 use toml::Spanned;
 
 use super::checked;
+use super::load::Purpose;
 use crate::checked::Study;
 use crate::diagnosis::{Diagnosis, Scenario};
 use crate::file::StudyFile;
@@ -35,7 +36,7 @@ pub(super) fn diagnosis(path: &Path, text: &str, host: &SolverHost) -> Result<Di
     check_section(&source, &section);
     source.verdict()?;
     file.needs_parameter = false;
-    let healthy = checked(path, &source, file, host)?;
+    let healthy = checked(path, &source, file, (host, Purpose::Runs))?;
     let scenario = |at| scenario(path, text, at, &healthy, host);
     let scenarios = (0..section.scenarios.len()).map(scenario).collect::<Result<_, _>>()?;
     let false_alarm = section.false_alarm.map_or(FALSE_ALARM, Spanned::into_inner);
@@ -123,7 +124,7 @@ fn scenario(
     let (name, says) = (section.name.get_ref().clone(), std::mem::take(&mut section.says));
     let weight = section.weight.take().map_or(1.0, Spanned::into_inner);
     enter(&mut file, section);
-    let mut study = checked(path, &source, file, host)?;
+    let mut study = checked(path, &source, file, (host, Purpose::Runs))?;
     let grid = grid.into_iter().filter_map(|starts| starts_of(&source, &study, starts)).collect();
     source.verdict()?;
     study.warnings.retain(|warning| !healthy.warnings.contains(warning));

@@ -6,7 +6,7 @@
 use starlings_models::catalogue::NATIVE;
 use starlings_models::observer::{self, Wiring};
 use starlings_models::spectrum::start;
-use starlings_models::{BuildSetup, ObserverDef, SOLVER, SetupError};
+use starlings_models::{BuildSetup, ObserverDef, SOLVER, SetupError, Spec};
 
 use super::observer::{fitted, report, spacing};
 use crate::file::ObserverSection;
@@ -24,7 +24,14 @@ pub(super) fn check(source: &Source, section: &ObserverSection, study: &Study) {
     for (section, def) in section.all().zip(study.setup.observer.all()) {
         if def.kind == KIND && !def.corrects.is_empty() {
             // What cannot be built was reported before.
-            if let Ok(Some((dt, record, most))) = limit(study, def)
+            let Ok(found) = Judged::new(study, def) else { continue };
+            if let Some((output, state)) = found.blind {
+                source.report_with(
+                    section.kind.span(),
+                    format!("the output `{output}` does not depend on the state `{state}`, which it is to correct: no gain brings it to the data"),
+                    "let it correct a state on which it depends, or leave it out of `corrects`",
+                );
+            } else if let Some((dt, record, most)) = found.limit
                 && *section.gain.get_ref() > most
             {
                 report(source, section, (dt, &record), most, &study.time_unit);
@@ -33,20 +40,33 @@ pub(super) fn check(source: &Source, section: &ObserverSection, study: &Study) {
     }
 }
 
-/// The largest spacing of what corrects, the record that has it, and the largest stable gain; `None` where every gain is stable.
-fn limit(study: &Study, def: &ObserverDef) -> Result<Option<(f64, String, f64)>, SetupError> {
-    let medians = study.theta_for(0, posterior::prior(study).mean.as_slice());
-    let (model, spec) = (study.setup.model()?, study.setup.spec()?);
-    let (theta, _) = start(&study.setup, &*model, &medians)?;
-    let fitted = fitted(&study.setup, &study.records);
-    let of = |outputs: &[String]| {
-        let wiring = Wiring { spec: &spec, outputs, model: &*model, theta: &theta, native: NATIVE };
-        observer::build(&def.alone(), wiring)
-    };
-    // As it works in the fit, where held-out channels are never seen; records have rows of all outputs.
-    let (observer, rows) = (of(&fitted)?, of(&study.setup.outputs)?.reads());
-    let trained = study.records.iter().filter(|record| record.is_trained());
-    let spacings = trained.filter_map(|record| Some((spacing(record, &rows)?, record.name.clone())));
-    let Some((dt, record)) = spacings.max_by(|a, b| a.0.total_cmp(&b.0)) else { return Ok(None) };
-    Ok(observer.stable_up_to(&*model, &theta, dt).map(|most| (dt, record, most)))
+/// What is found of an observer.
+struct Judged {
+    /// An output that does not depend on the state that it corrects, and that state.
+    blind: Option<(String, String)>,
+    /// The largest spacing of what corrects, the record that has it, and the largest stable gain; `None` where every gain is stable.
+    limit: Option<(f64, String, f64)>,
+}
+
+impl Judged {
+    fn new(study: &Study, def: &ObserverDef) -> Result<Self, SetupError> {
+        let medians = study.theta_for(0, posterior::prior(study).mean.as_slice());
+        let (model, spec) = (study.setup.model()?, study.setup.spec()?);
+        let (theta, _) = start(&study.setup, &*model, &medians)?;
+        let fitted = fitted(&study.setup, &study.records);
+        let of = |outputs: &[String]| {
+            let wiring = Wiring { spec: &spec, outputs, model: &*model, theta: &theta, native: NATIVE };
+            observer::build(&def.alone(), wiring)
+        };
+        // As it works in the fit, where held-out channels are never seen; records have rows of all outputs.
+        let (observer, rows) = (of(&fitted)?, of(&study.setup.outputs)?.reads());
+        let trained = study.records.iter().filter(|record| record.is_trained());
+        let spacings = trained.filter_map(|record| Some((spacing(record, &rows)?, record.name.clone())));
+        let widest = spacings.max_by(|a, b| a.0.total_cmp(&b.0));
+        let named =
+            |(output, state)| (Spec::component(&spec.outputs, output), Spec::component(&spec.states, state));
+        let limit =
+            widest.and_then(|(dt, record)| Some((dt, record, observer.stable_up_to(&*model, &theta, dt)?)));
+        Ok(Self { blind: observer.blind(&*model, &theta).map(named), limit })
+    }
 }

@@ -12,10 +12,13 @@ use crate::checked::Record;
 use crate::expand::INITIAL;
 use crate::file::StudyFile;
 use crate::problem::Source;
-use repeats::{channel_mismatch, found, input_mismatch};
+use repeats::{channel_mismatch, found, has_left, input_mismatch, spacing};
 
 /// Root mean square difference from one period to the next, over the range, that a period may leave in an input.
 const NOT_PERIODIC: f64 = 0.1;
+
+/// Samples of the inputs, in each period, to which the period is known.
+const RESOLVED: f64 = 0.5;
 
 /// The period of every record; empty where runs begin in the initial state, or a problem was reported.
 pub(super) fn periods(
@@ -23,6 +26,7 @@ pub(super) fn periods(
     file: &StudyFile,
     model: &CheckedModel,
     records: &[Record],
+    warnings: &mut Vec<String>,
 ) -> Vec<f64> {
     let given = || file.records.iter().filter_map(|r| r.period.as_ref()).chain(&file.model.period);
     let start = file.model.start.as_ref().filter(|start| start.get_ref() != "initial");
@@ -46,7 +50,7 @@ pub(super) fn periods(
     if !sound {
         return Vec::new();
     }
-    let of_record = |record: &Record| of_record(source, file, model, record, start);
+    let of_record = |record: &Record| of_record(source, (file, model), record, start, warnings);
     records.iter().filter_map(of_record).collect()
 }
 
@@ -81,16 +85,20 @@ fn is_possible(source: &Source, file: &StudyFile, model: &CheckedModel, start: &
 
 fn of_record(
     source: &Source,
-    file: &StudyFile,
-    model: &CheckedModel,
+    (file, model): (&StudyFile, &CheckedModel),
     record: &Record,
     start: &Spanned<String>,
+    warnings: &mut Vec<String>,
 ) -> Option<f64> {
     let section = file.records.iter().find(|section| *section.name.get_ref() == record.name)?;
     let Some(given) = section.period.as_ref().or(file.model.period.as_ref()) else {
         let known = found(&record.inputs, record.start);
         if known.is_none() {
-            let message = format!("no period is found in the inputs of record `{}`", record.name);
+            let message = if record.inputs.is_empty() {
+                format!("the model `{}` has no inputs, in which a period would be found", model.spec.kind)
+            } else {
+                format!("no period is found in the inputs of record `{}`", record.name)
+            };
             source.report_with(start.span(), message, "give `period`, in `[model]` or in the record");
         }
         return known;
@@ -120,6 +128,48 @@ fn of_record(
         );
         source.report_with(given.span(), message, help);
         return None;
+    }
+    multiple(source, record, given, warnings)
+}
+
+/// The given period, where the inputs can have come back after it: refused where they have hardly left by then, warned of where it is
+/// no whole multiple of the period that is found in them.
+fn multiple(
+    source: &Source,
+    record: &Record,
+    given: &Spanned<f64>,
+    warnings: &mut Vec<String>,
+) -> Option<f64> {
+    let (period, name) = (*given.get_ref(), &record.name);
+    let Some(known) = found(&record.inputs, record.start) else {
+        if has_left(&record.inputs, record.start, period) {
+            return Some(period);
+        }
+        let message = format!(
+            "a period of {period} is none of record `{name}`: its inputs have hardly changed by then"
+        );
+        source.report_with(given.span(), message, "give the time after which inputs and data repeat");
+        return None;
+    };
+    let times = (period / known).round();
+    if times < 1.0 {
+        let message = format!(
+            "a period of {period} is far below that of record `{name}`, whose inputs repeat every {known:.6}"
+        );
+        source.report_with(
+            given.span(),
+            message,
+            "without `period` that is taken; a whole multiple of it is right too",
+        );
+        return None;
+    }
+    let (nearest, resolved) = (times * known, RESOLVED * times * spacing(&record.inputs));
+    if (period - nearest).abs() > resolved {
+        warnings.push(format!(
+            "`period` = {period} of record `{name}` is no whole multiple of {known:.6}, after which its inputs repeat ({nearest:.6} is the \
+             nearest, to {resolved:.1e}): runs begin in a state that belongs to other inputs, and estimates follow it. Leave out `period`, \
+             and {known:.6} is taken."
+        ));
     }
     Some(period)
 }

@@ -29,8 +29,13 @@ pub(crate) fn observer(
             source.report_with(one.kind.span(), message, "remove it, or give both");
         }
     }
-    let beside = section.beside.iter().map(|other| one_observer(source, other, solver)).collect();
-    ObserverDef { beside, ..one_observer(source, section, solver) }
+    let one = |section_of: &ObserverSection| {
+        let def = one_observer(source, section_of, solver);
+        let of_its_kind = section.all().filter(|other| *other.kind.get_ref() == def.kind).count();
+        ObserverDef { named_only: of_its_kind > 1 && !def.corrects.is_empty(), ..def }
+    };
+    let beside = section.beside.iter().map(one).collect();
+    ObserverDef { beside, ..one(section) }
 }
 
 fn one_observer(source: &Source, section: &ObserverSection, solver: Option<&Description>) -> ObserverDef {
@@ -204,17 +209,19 @@ fn foreign_keys(source: &Source, section: &EstimatorSection, kind: &Kind, once: 
         ("tolerance", section.tolerance.as_ref().map(Spanned::span)),
     ];
     for (key, span) in given {
-        // Of several the first that goes through the data in the same way.
-        let owners = KINDS.iter().filter(|other| other.keys.contains(&key));
-        let owner = owners.min_by_key(|other| other.is_filter() != kind.is_filter());
-        if let (Some(span), Some(owner), false) = (span, owner, kind.keys.contains(&key)) {
+        let owners: Vec<&&Kind> = KINDS.iter().filter(|other| other.keys.contains(&key)).collect();
+        // Those that go through the data in the same way, where there are such.
+        let alike = owners.iter().any(|other| other.is_filter() == kind.is_filter());
+        let names = owners.iter().filter(|other| !alike || other.is_filter() == kind.is_filter());
+        let names = names.map(|other| format!("\"{}\"", other.name)).collect::<Vec<_>>().join(" or ");
+        if let (Some(span), false, false) = (span, names.is_empty(), kind.keys.contains(&key)) {
             let help = match once {
                 Some(solver) => {
                     format!("remove it: the solver `{}` cannot restart from a state", solver.name)
                 }
-                None => format!("remove it, or use kind = \"{}\"", owner.name),
+                None => format!("remove it, or use kind = {names}"),
             };
-            source.report_with(span, format!("`{key}` belongs to kind = \"{}\"", owner.name), help);
+            source.report_with(span, format!("`{key}` belongs to kind = {names}"), help);
         }
     }
 }

@@ -2,21 +2,20 @@
 //!
 //! Next file to read: [`crate::checked`].
 
+use starlings_models::ObserverDef;
 use starlings_models::spectrum::Decay;
 
 use crate::checked::SpectrumChoice;
-use crate::file::ObserverSection;
 use crate::file::spectrum::{DecaySection, SpectrumSection};
 use crate::problem::Source;
 
 /// `[spectrum]`.
-pub(super) fn spectrum(source: &Source, section: &SpectrumSection, own: &ObserverSection) -> SpectrumChoice {
+pub(super) fn spectrum(source: &Source, section: &SpectrumSection, own: &ObserverDef) -> SpectrumChoice {
     let mut kinds: Vec<String> =
         starlings_models::observer::kinds().iter().map(|k| k.kind.to_owned()).collect();
     // Several observers of the study are one entry, under their joined name.
-    let own: Vec<&str> = own.all().map(|one| one.kind.get_ref().as_str()).collect();
-    if own.len() > 1 {
-        kinds.push(own.join(" + "));
+    if !own.beside.is_empty() {
+        kinds.push(own.name());
     }
     for name in section.observers.iter().filter(|name| !kinds.contains(name.get_ref())) {
         source.report_unknown(name.span(), format!("unknown observer `{}`", name.get_ref()), &kinds);

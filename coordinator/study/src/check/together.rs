@@ -6,6 +6,7 @@ use starlings_models::catalogue::NATIVE;
 use starlings_models::spectrum::{LinearisedSetup, SpectrumError};
 use starlings_models::{BuildSetup, SOLVER};
 
+use super::load::Purpose;
 use crate::file::ObserverSection;
 use crate::problem::Source;
 use crate::{Study, posterior};
@@ -14,7 +15,7 @@ use crate::{Study, posterior};
 const ROUNDING: f64 = 1e-9;
 
 /// Reports observers that correct the same state, or are unstable together though each is stable.
-pub(super) fn check(source: &Source, section: &ObserverSection, study: &Study) {
+pub(super) fn check(source: &Source, section: &ObserverSection, study: &Study, purpose: Purpose) {
     if section.beside.is_empty() || study.setup.model.kind == SOLVER {
         return;
     }
@@ -22,16 +23,19 @@ pub(super) fn check(source: &Source, section: &ObserverSection, study: &Study) {
     // A model that no matrix describes where its runs start is told by `starlings spectrum`.
     let Ok(linearised) = linearised(study) else { return };
     if let Ok(Some((first, second, state))) = linearised.shared_state() {
-        let (first, second) = (sections[first], sections[second]);
+        let outputs = linearised.outputs_read().unwrap_or_default();
+        let told = |at: usize| {
+            let of = outputs.get(at).map_or_else(String::new, |of| format!(" by `{}`", of.join("`, `")));
+            format!("`{}`{of}", sections[at].kind.get_ref())
+        };
         source.report_with(
-            second.kind.span(),
-            format!(
-                "the observers `{}` and `{}` both correct the state `{state}`",
-                first.kind.get_ref(),
-                second.kind.get_ref()
-            ),
-            "keep one of the two, or give them states of their own",
+            sections[second].kind.span(),
+            format!("the observers {} and {} both correct the state `{state}`", told(first), told(second)),
+            "keep one of the two, or give them states of their own; where two of one kind stand, `corrects` names the outputs of each",
         );
+        return;
+    }
+    if purpose == Purpose::Poles {
         return;
     }
     let Ok((together, alone)) = linearised.together_and_alone() else { return };
@@ -43,7 +47,7 @@ pub(super) fn check(source: &Source, section: &ObserverSection, study: &Study) {
             format!(
                 "the observers `{name}` are each stable and unstable together: the slowest error grows with {together:.3} 1/{unit}"
             ),
-            "lower one of the gains: `starlings spectrum` shows the poles, with both gains in proportion",
+            format!("{}`starlings spectrum` shows the poles, with the gains in proportion", remedy(&linearised)),
         );
     }
 }
@@ -51,6 +55,24 @@ pub(super) fn check(source: &Source, section: &ObserverSection, study: &Study) {
 /// Whether errors grow under all observers together and under none alone; growth that is rounding counts as none.
 fn disagree(together: f64, alone: &[f64], rounding: f64) -> bool {
     together > rounding && alone.iter().all(|growth| *growth <= rounding)
+}
+
+/// Which common factor on the gains is stable, to begin a sentence.
+fn remedy(linearised: &LinearisedSetup) -> String {
+    match linearised.stable_share() {
+        Ok(Some(share)) if share > 0.0 => format!(
+            "lower one of the gains, or all of them: the largest common factor that is stable is {}; ",
+            rounded_down(share)
+        ),
+        _ => "lower one of the gains: ".to_owned(),
+    }
+}
+
+/// Three digits that are not above the value.
+fn rounded_down(value: f64) -> f64 {
+    let digit = 10_f64.powi(value.log10().floor() as i32 - 2);
+    let down = (value / digit).floor() * digit;
+    format!("{down:.3e}").parse().unwrap_or(down)
 }
 
 fn linearised(study: &Study) -> Result<LinearisedSetup, SpectrumError> {
@@ -61,7 +83,13 @@ fn linearised(study: &Study) -> Result<LinearisedSetup, SpectrumError> {
 
 #[cfg(test)]
 mod tests {
-    use super::disagree;
+    use super::{disagree, rounded_down};
+
+    #[test]
+    fn a_bound_is_never_rounded_up() {
+        assert!((rounded_down(0.123_99) - 0.123).abs() < 1e-12);
+        assert!((rounded_down(0.1) - 0.1).abs() < 1e-3 && rounded_down(0.1) <= 0.1);
+    }
 
     #[test]
     fn only_growth_that_no_observer_has_alone_is_their_disagreement() {

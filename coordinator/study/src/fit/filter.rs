@@ -6,6 +6,7 @@
 
 use starlings_estimators::{Analysis, Data, MakeFilter, Particles};
 
+use super::drifting::{self, Before};
 use super::ensemble::{noise, recombine};
 use super::resample;
 use super::rescue::{Forecast, forecast};
@@ -81,7 +82,7 @@ pub(super) fn step(
 ) -> Result<(AnalysisRow, Reported), RunError> {
     let windows = schedule.step_windows(now.figures.step);
     let at = AnalysisIndex { pass: now.figures.pass + 1, step: now.figures.step };
-    let filter = schedule.filter(now.figures.pass);
+    let filter = &*schedule.filter;
     let before_runs = runner.counts;
     let Forecast { mut particles, results, rescued } =
         forecast(runner, filter, particles(now), &mut now.states, &windows, at)?;
@@ -96,14 +97,19 @@ pub(super) fn step(
         let states = &mut now.states;
         let drawn = resample::redraw(runner, filter, at, &windows, &particles, &predictions, states)?;
         if let Some(redrawn) = drawn {
+            if let Some(from) = &mut now.estimate.from_start {
+                from.redrawn(filter, &particles, &redrawn.transform);
+            }
             (particles, predictions) = (redrawn.particles, redrawn.predictions);
             now.figures.dropped = now.figures.dropped.max(redrawn.dropped);
         }
     }
     let values: Vec<f64> = windows.iter().flat_map(|(_, w)| w.observed.iter().copied()).collect();
     let noise = noise(schedule.study, &windows, schedule.anneal(now.figures.pass));
-    let (particles, analysis) =
+    let (after, mut analysis) =
         filter.analysis(&particles, &predictions, &Data { values: &values, noise: &noise })?;
+    let before_it = Before { particles: &particles, predictions: &predictions };
+    let particles = drifting::go_on(schedule, filter, now, &before_it, after, &mut analysis)?;
     recombine(&mut now.states, &analysis.transform, runner)?;
     for (record, states) in now.states.iter_mut().enumerate() {
         if schedule.windows[record].len() <= at.step + 1 {

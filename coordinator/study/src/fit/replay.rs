@@ -68,8 +68,14 @@ fn restored(study: &Study, inputs: Inputs) -> Result<Snapshot<Ensemble>, RunErro
         return Err(StoreError::Unusable(text.to_owned()).into());
     };
     let column = |index| start.column(index).iter().copied().collect();
-    let estimate =
-        Ensemble { theta: (&theta).into(), centre: column(0), scale: column(1), cost: None, narrow: 1.0 };
+    let estimate = Ensemble {
+        theta: (&theta).into(),
+        centre: column(0),
+        scale: column(1),
+        cost: None,
+        narrow: 1.0,
+        from_start: None,
+    };
     let figures = Figures { pass: pass - 1, step, ..Figures::default() };
     Ok(Snapshot { figures, estimate, states: states.into_iter().map(|x| x.map(States::from)).collect() })
 }

@@ -91,6 +91,8 @@ pub(crate) struct Redrawn {
     pub(crate) particles: Particles,
     /// Their predictions, m × r.
     pub(crate) predictions: DMatrix<f64>,
+    /// The r × r matrix R of X ← X R.
+    pub(crate) transform: DMatrix<f64>,
     /// Share of the spread, in the norm of the Gram matrix, that they leave out.
     pub(crate) dropped: f64,
 }
@@ -114,14 +116,14 @@ pub(crate) fn redraw(
         filter.resample(particles, &gram(study, filter.weights(), particles, states)?)?;
     let mut mixed = states.clone();
     recombine(&mut mixed, &transform, runner)?;
-    let mut observed = predictions * transform;
+    let mut observed = predictions * &transform;
     // Where an observer has corrected the state by the datum, an output of that state is no prediction of it.
     if study.observer_is_off() && !observe_again(runner, at, &redrawn.theta, &mixed, windows, &mut observed)?
     {
         return Ok(None);
     }
     *states = mixed;
-    Ok(Some(Redrawn { particles: redrawn, predictions: observed, dropped }))
+    Ok(Some(Redrawn { particles: redrawn, predictions: observed, transform, dropped }))
 }
 
 /// Puts the outputs at the windows' ends, by runs of zero length, into the predictions; `false` when a run fails.

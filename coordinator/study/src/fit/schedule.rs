@@ -7,14 +7,15 @@
 //! says how far along it the next pass starts, and when the passes end.
 //!
 //! A parameter that drifts has no single value to linearise around, and exchanging priors is not exact for it. A study with
-//! one has two passes at most: the annealed one without drift, and one with drift that starts from the annealed posterior,
-//! in which the data count with 1/anneal² of their weight. Next file to read: [`super::settle`].
+//! one has two passes at most: the annealed one without drift, and one with drift that starts from the annealed posterior; what
+//! that start adds is taken out by [`super::drifting`]. Next file to read: [`super::settle`].
 
 use std::sync::Arc;
 
-use starlings_estimators::{Drift, Filter, Gaussian, MakeFilter, Options, Particles, exchange_prior};
+use starlings_estimators::{Filter, FromStart, Gaussian, MakeFilter, Particles, exchange_prior};
 use starlings_models::Window;
 
+use super::drifting;
 use super::runner::{EnsembleRunner, StepWindows};
 use super::walking::Walking;
 use crate::store::snapshot::{Ensemble, Figures, Snapshot};
@@ -28,12 +29,11 @@ const CLOSEST: f64 = 1e-6;
 /// Everything about the fit that does not change from step to step.
 pub(super) struct Schedule<'a> {
     pub(super) study: &'a Study,
-    still: Box<dyn Filter>,
-    drifting: Option<Box<dyn Filter>>,
+    pub(super) filter: Box<dyn Filter>,
     /// Number of passes where it is fixed; `None` for as many as it takes.
     pub(super) passes: Option<usize>,
     pub(super) resample: bool,
-    prior: Gaussian,
+    pub(super) prior: Gaussian,
     /// Entries that follow their states in the pass with drift.
     walking: Walking,
     /// Training windows by record.
@@ -50,27 +50,18 @@ pub(super) struct Reported {
 
 impl<'a> Schedule<'a> {
     pub(super) fn new(study: &'a Study, make: MakeFilter) -> Result<Self, RunError> {
-        let options = study.filter_options();
-        let drift: Vec<Drift> = study.theta.iter().map(|t| t.drift).collect();
-        let still = make(&options)?;
-        let work = WorkPlan::new(study, still.n_particle());
-        let drifting = study.drifts().then(|| make(&Options { drift, ..options })).transpose()?;
+        let filter = make(&study.filter_options())?;
+        let work = WorkPlan::new(study, filter.n_particle());
         Ok(Self {
             study,
-            resample: study.estimator.resample && still.resamples(),
-            drifting,
-            still,
+            resample: study.estimator.resample && filter.resamples(),
+            filter,
             passes: study.passes(),
             walking: Walking::of(study),
             prior: posterior::prior(study),
             windows: (0..study.records.len()).map(|record| study.windows(record)).collect(),
             work,
         })
-    }
-
-    /// The filter of one pass: drift belongs to the last.
-    pub(super) fn filter(&self, pass: usize) -> &dyn Filter {
-        self.drifting.as_deref().filter(|_| self.is_last(pass)).unwrap_or(&*self.still)
     }
 
     /// The entries that follow their states in one pass: those of states that walk, in the pass with drift.
@@ -98,8 +89,8 @@ impl<'a> Schedule<'a> {
     /// parameter to less than `spread` of its prior, the predictions of a wider ensemble would be far from linear.
     fn scale(&self, pass: usize, around: &Gaussian, narrow: f64) -> Vec<f64> {
         let sd = posterior::standard_deviations(around);
-        if pass > 0 && self.drifting.is_some() {
-            return sd;
+        if pass > 0 && self.study.drifts() {
+            return self.study.theta.iter().zip(sd).map(|(t, sd)| sd.min(t.prior_sd)).collect();
         }
         let spread = if pass == 0 { 1.0 } else { self.study.estimator.spread };
         let closest = |prior: f64, sd: f64| narrow * sd.max(CLOSEST * prior).min(spread * prior);
@@ -123,10 +114,20 @@ impl<'a> Schedule<'a> {
         narrow: f64,
     ) -> Snapshot<Ensemble> {
         let scale = self.scale(pass, around, narrow);
-        let particles = self.still.init(&posterior::independent(&centre, &scale));
+        let start = posterior::independent(&centre, &scale);
+        let particles = self.filter.init(&start);
+        let from_start =
+            (self.study.drifts() && self.is_last(pass)).then(|| Box::new(FromStart::new(&start)));
         Snapshot {
             figures: Figures { pass, ..Figures::default() },
-            estimate: Ensemble { theta: (&particles.theta).into(), centre, scale, cost: None, narrow },
+            estimate: Ensemble {
+                theta: (&particles.theta).into(),
+                centre,
+                scale,
+                cost: None,
+                narrow,
+                from_start,
+            },
             states: vec![None; self.study.records.len()],
         }
     }
@@ -138,16 +139,20 @@ impl<'a> Schedule<'a> {
 
     /// What is known now under the study's own prior, whatever spread this pass started with.
     pub(super) fn reported(&self, now: &Snapshot<Ensemble>) -> Result<Reported, RunError> {
-        let posterior = self.still.gaussian(&particles(now));
-        if now.figures.pass == 0 || self.drifting.is_some() {
-            return Ok(Reported {
-                posterior,
-                log_likelihood: now.figures.log_likelihood,
-                nis: now.figures.nis,
-            });
-        }
-        let used = posterior::independent(&now.estimate.centre, &now.estimate.scale);
-        let exchanged = exchange_prior(&posterior, &used, &self.prior)?;
+        let used = drifting::used(&now.estimate);
+        let exchanged = if let Some(from) = &now.estimate.from_start {
+            from.restated(&used, &self.prior)?
+        } else {
+            let posterior = self.filter.gaussian(&particles(now));
+            if now.figures.pass == 0 || self.study.drifts() {
+                return Ok(Reported {
+                    posterior,
+                    log_likelihood: now.figures.log_likelihood,
+                    nis: now.figures.nis,
+                });
+            }
+            exchange_prior(&posterior, &used, &self.prior)?
+        };
         Ok(Reported {
             nis: exchanged.corrected_nis(now.figures.nis),
             log_likelihood: now.figures.log_likelihood + exchanged.log_likelihood,
@@ -158,7 +163,7 @@ impl<'a> Schedule<'a> {
     /// How far the pass moved the estimate from where it started: the entry that moved most, in posterior standard deviations.
     /// `None` for a first pass, which starts at the prior, and for parameters that drift.
     pub(super) fn last_move(&self, now: &Snapshot<Ensemble>, reported: &Reported) -> Option<Move> {
-        if now.figures.pass == 0 || self.drifting.is_some() {
+        if now.figures.pass == 0 || self.study.drifts() {
             return None;
         }
         let sd = posterior::standard_deviations(&reported.posterior);

@@ -198,7 +198,14 @@ mod tests {
     fn at(step: usize) -> Snapshot<Ensemble> {
         let theta = DMatrix::from_fn(2, 3, |i, j| (i + 2 * j + 6 * step) as f64 / 3.0);
         let (centre, scale) = (vec![0.1, 0.2], vec![0.3, 0.4]);
-        let estimate = Ensemble { theta: Matrix::from(&theta), centre, scale, cost: None, narrow: 1.0 };
+        let estimate = Ensemble {
+            theta: Matrix::from(&theta),
+            centre,
+            scale,
+            cost: None,
+            narrow: 1.0,
+            from_start: None,
+        };
         let states = if step == 0 { None } else { Some(DMatrix::from_element(4, 3, step as f64).into()) };
         Snapshot { figures: Figures { step, ..Figures::default() }, estimate, states: vec![None, states] }
     }

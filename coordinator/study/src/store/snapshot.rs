@@ -7,7 +7,7 @@
 use nalgebra::DMatrix;
 use rusqlite::{Connection, OptionalExtension, params};
 use serde::{Deserialize, Serialize};
-use starlings_estimators::{BatchState, Gaussian};
+use starlings_estimators::{BatchState, FromStart, Gaussian};
 use starlings_fleet::{StateStore, StoredState};
 use starlings_proto::convert::floats;
 
@@ -99,6 +99,9 @@ pub struct Ensemble {
     pub cost: Option<f64>,
     /// Factor on the width of the points of this pass.
     pub narrow: f64,
+    /// In a pass with drift, what it says of where it started.
+    #[serde(default)]
+    pub from_start: Option<Box<FromStart>>,
 }
 
 /// All that a batch fit knows after an ensemble; what a killed run continues from, or ends with if it was the last one.

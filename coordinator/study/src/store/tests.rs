@@ -26,7 +26,9 @@ fn row(step: usize) -> AnalysisRow {
 fn snapshot(step: usize) -> Snapshot {
     let figures = Figures { step, n_used: step, ..Figures::default() };
     let (centre, scale) = (Vec::new(), Vec::new());
-    let estimate = Ensemble { theta: Matrix::default(), centre, scale, cost: None, narrow: 1.0 }.into();
+    let estimate =
+        Ensemble { theta: Matrix::default(), centre, scale, cost: None, narrow: 1.0, from_start: None }
+            .into();
     Snapshot { figures, estimate, states: vec![Some(DMatrix::from_element(8, 3, step as f64).into())] }
 }
 

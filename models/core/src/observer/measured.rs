@@ -21,7 +21,7 @@ pub(crate) struct Measured {
 }
 
 /// The state component behind every observed row that measures one: the definition's `corrects` first, then the model's own
-/// `measures`.
+/// `measures`, which do not count where another observer of the kind stands beside it.
 ///
 /// # Errors
 /// When a name in `corrects` is unknown, or the sizes of an output and its state differ.
@@ -55,7 +55,8 @@ fn behind(
     n: usize,
 ) -> Result<Option<Range<usize>>, SetupError> {
     let named = |name: &str| {
-        let own = || spec.measures.iter().find(|(of, _)| of == name).map(|(_, state)| state.as_str());
+        let mut measures = spec.measures.iter().filter(|_| !def.named_only);
+        let own = || measures.find(|(of, _)| of == name).map(|(_, state)| state.as_str());
         def.corrects.get(name).map(String::as_str).or_else(own)
     };
     let (field, index) = match output.strip_suffix(']').and_then(|o| o.rsplit_once('[')) {
@@ -100,6 +101,25 @@ pub(super) fn pull(at: &Correction<'_>, rows: &[usize]) -> Option<(f64, f64)> {
         weights += weight;
     }
     Some((sum / weights, weights * longest))
+}
+
+/// The outputs of a list to which these rows belong, each once; a field by its name.
+///
+/// # Errors
+/// When an output is unknown.
+pub fn outputs_of(spec: &Spec, outputs: &[String], rows: &[usize]) -> Result<Vec<String>, SetupError> {
+    let (mut first, mut found) = (0, Vec::new());
+    for output in outputs {
+        let n = shown(spec, output)?.map_or(1, |components| components.len());
+        let field = output.split('[').next().unwrap_or(output);
+        if rows.iter().any(|row| (first..first + n).contains(row))
+            && !found.iter().any(|known| known == field)
+        {
+            found.push(field.to_owned());
+        }
+        first += n;
+    }
+    Ok(found)
 }
 
 /// Components of an observed output; `None` for a recorded state, which takes one row and measures nothing.

@@ -15,7 +15,7 @@ use std::ops::AddAssign;
 use nalgebra::DMatrix;
 
 use super::measured::{Measured, measured, pull};
-use super::slopes::slopes;
+use super::slopes::{slopes, slopes_beside};
 use super::{Correction, Kind, Observer, Wiring};
 use crate::Model;
 use crate::SetupError;
@@ -38,6 +38,8 @@ const WHOLE: f64 = 50.0;
 /// Tenths of a decade below it that are looked at where states have unequal numbers of rows; what is unstable between two of them alone is
 /// not seen.
 const TENTHS: i32 = 80;
+/// Distances from the start, in parts of the state, at which an output may show what it corrects.
+const BESIDE: [f64; 3] = [0.0, 0.1, -0.07];
 /// Share of the largest eigenvalue below which one is zero: slopes are differences of outputs.
 const ROUNDING: f64 = 1e-6;
 
@@ -156,6 +158,19 @@ impl Observer for Nudging {
             if self.is_stable(&observation, middle) { stable = middle } else { unstable = middle }
         }
         Some(stable / dt)
+    }
+
+    fn blind(&self, model: &dyn Model, theta: &[f64]) -> Option<(usize, usize)> {
+        if self.named.len() > MOST {
+            return None;
+        }
+        let states: Vec<usize> = self.channels.iter().map(|(state, _)| *state).collect();
+        // An output may show nothing of a state at one place: a square at zero, a product with an input that is off.
+        let places = BESIDE.map(|beside| slopes_beside(model, theta, &states, beside));
+        let shown = |output: usize, j: usize| places.iter().any(|slopes| slopes[(output, j)] != 0.0);
+        let pairs =
+            self.named.iter().enumerate().flat_map(|(j, outputs)| outputs.iter().map(move |o| (*o, j)));
+        pairs.into_iter().find(|(output, j)| !shown(*output, *j)).map(|(output, j)| (output, states[j]))
     }
 
     fn feedback(&self, model: &dyn Model, theta: &[f64]) -> DMatrix<f64> {

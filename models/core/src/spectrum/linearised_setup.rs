@@ -2,7 +2,7 @@
 //!
 //! It keeps the observed outputs of the setup: a setup that observes half a wall shows partial observation. Next file to read: [`mod@super::observed`].
 
-use std::collections::BTreeMap;
+mod own;
 
 use nalgebra::{Complex, DMatrix};
 
@@ -140,7 +140,7 @@ impl LinearisedSetup {
     pub fn observers(&self) -> Vec<(String, Option<SetupError>)> {
         let own = (!self.observer.beside.is_empty()).then(|| self.observer.name());
         let kinds = observer::kinds().into_iter().map(|kind| kind.kind).filter(|kind| *kind != "none");
-        let names = own.into_iter().chain(kinds.map(str::to_owned));
+        let names = own.into_iter().chain(kinds.flat_map(|kind| self.of_kind(kind)));
         names.map(|name| (name.clone(), self.build(&name, 1.0).err())).collect()
     }
 
@@ -167,41 +167,6 @@ impl LinearisedSetup {
     fn wiring(&self) -> Wiring<'_> {
         let (spec, outputs, model, theta) = (&self.spec, &self.outputs[..], &*self.model, &self.theta[..]);
         Wiring { spec, outputs, model, theta, native: self.native }
-    }
-
-    /// The definition of a kind, or of the setup's own observers by their joined name.
-    fn def(&self, kind: &str, gain: f64) -> ObserverDef {
-        if !self.observer.beside.is_empty() && self.observer.name() == kind {
-            return self.observer.at(gain);
-        }
-        let own = self.observer.all().find(|def| def.kind == kind);
-        let own = own.or_else(|| (kind == "nudging").then_some(&self.observer));
-        let corrects = own.map_or_else(BTreeMap::default, |def| def.corrects.clone());
-        ObserverDef { kind: kind.to_owned(), gain, corrects, ..ObserverDef::default() }
-    }
-
-    /// The largest real part of the poles under the setup's own observers, and under each of them alone at its gain, in 1/time.
-    ///
-    /// # Errors
-    /// When the model cannot host one of them, or the poles are not found.
-    pub fn together_and_alone(&self) -> Result<(f64, Vec<f64>), SpectrumError> {
-        let largest = |def: &ObserverDef| {
-            let matrix = &self.a - self.feedback(&*observer::build(def, self.wiring())?);
-            ObservedSystem::new(&matrix, &Feedback::none(matrix.nrows()), self.negligible())?.max_re(0.0)
-        };
-        let alone = self.observer.all().map(|def| largest(&def.alone())).collect::<Result<_, _>>()?;
-        Ok((largest(&self.observer)?, alone))
-    }
-
-    /// Two of the setup's own observers that correct one state, and that state.
-    ///
-    /// # Errors
-    /// When the model cannot host one of them.
-    pub fn shared_state(&self) -> Result<Option<(usize, usize, String)>, SetupError> {
-        let all = self.observer.all().map(|def| observer::build(&def.alone(), self.wiring()));
-        let all = all.collect::<Result<Vec<_>, _>>()?;
-        let found = observer::shared_state(&all, &*self.model, &self.theta);
-        Ok(found.map(|(i, j, at)| (i, j, Spec::component(&self.spec.states, at))))
     }
 
     fn feedback(&self, observer: &dyn observer::Observer) -> DMatrix<f64> {

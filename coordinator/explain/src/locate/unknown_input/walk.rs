@@ -79,7 +79,7 @@ impl Walk<'_> {
         let Some(start) = self.start(fleet, &windows)? else { return Ok(Vec::new()) };
         let n = start.len() + 1;
         let set = SigmaSet::new(Points::Simplex, n.min(DIRECTIONS))?;
-        let roukf = Roukf { set, root: Root::Symmetric, drift: Vec::new() };
+        let roukf = Roukf { set, root: Root::Symmetric };
         let mut walks: Vec<Option<Forward>> =
             intensities.iter().map(|i| Some(self.begin(&roukf, &start, *i, windows.len()))).collect();
         for window in &windows {

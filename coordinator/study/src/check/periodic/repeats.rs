@@ -16,6 +16,8 @@ const COARSEST: f64 = 5.0;
 const FOUND: f64 = 0.05;
 /// Difference that a signal must have come to before it can be said to return.
 const AWAY: f64 = 0.15;
+/// Lags within a period at which a signal may have left.
+const WITHIN: u32 = 32;
 /// Steps of the search around a lag: each leaves 0.62 of the span.
 const GOLDEN: usize = 60;
 /// A period this near to a sample, in samples, is that sample.
@@ -61,7 +63,7 @@ pub(super) fn channel_mismatch(record: &Record, channel: &Channel, period: f64) 
 pub(super) fn found(inputs: &[Signal], start: f64) -> Option<f64> {
     let end = inputs.iter().filter_map(|s| s.times.last().copied()).reduce(f64::min)?;
     let finest = inputs.iter().max_by_key(|s| s.times.len())?;
-    let sample = (finest.times.last()? - finest.times.first()?) / (finest.times.len() - 1) as f64;
+    let sample = spacing(inputs);
     let longest = (end - start) / 1.5;
     if !(longest > sample && sample > 0.0) {
         return None;
@@ -84,6 +86,22 @@ pub(super) fn found(inputs: &[Signal], start: f64) -> Option<f64> {
         }
     }
     None
+}
+
+/// Time between two samples of the input that has most of them; 0 without any.
+pub(super) fn spacing(inputs: &[Signal]) -> f64 {
+    let of = |s: &Signal| Some((s.times.last()? - s.times.first()?) / (s.times.len() - 1).max(1) as f64);
+    inputs.iter().max_by_key(|s| s.times.len()).and_then(of).unwrap_or(0.0)
+}
+
+/// Whether an input has changed within a time as a signal must that can be said to return; of inputs that never change nothing is asked.
+pub(super) fn has_left(inputs: &[Signal], start: f64, period: f64) -> bool {
+    let varying = || inputs.iter().filter(|signal| range(&signal.values).is_some());
+    let lags = (1..WITHIN).map(|k| period * f64::from(k) / f64::from(WITHIN));
+    varying().next().is_none()
+        || lags
+            .clone()
+            .any(|lag| varying().filter_map(|s| input_mismatch(s, start, lag)).any(|share| share > AWAY))
 }
 
 /// The lowest place of a function between two ends (golden section; Kiefer 1953).
@@ -146,6 +164,17 @@ mod tests {
         let constant = Signal { times: vec![0.0, 1.0, 2.0, 3.0], values: vec![2.0; 4] };
         assert_eq!(found(&[constant], 0.0), None);
         assert_eq!(found(&[], 0.0), None);
+    }
+
+    #[test]
+    fn a_signal_has_left_within_a_period_and_not_within_a_sample() {
+        let signal = [beats(0.8, 40, 4)];
+        assert!(
+            has_left(&signal, 0.0, 0.8) && !has_left(&signal, 0.0, 1e-9) && !has_left(&signal, 0.0, 0.02)
+        );
+        let constant = Signal { times: vec![0.0, 1.0], values: vec![2.0; 2] };
+        assert!(has_left(&[constant], 0.0, 1e-9) && has_left(&[], 0.0, 1e-9), "nothing that could leave");
+        assert!((spacing(&signal) - 0.02).abs() < 1e-12);
     }
 
     #[test]

@@ -15,7 +15,9 @@ fn snapshot(states: &StateStore, step: usize) -> Snapshot {
     };
     let figures = Figures { step, ..Figures::default() };
     let (centre, scale) = (Vec::new(), Vec::new());
-    let estimate = Ensemble { theta: Matrix::default(), centre, scale, cost: None, narrow: 1.0 }.into();
+    let estimate =
+        Ensemble { theta: Matrix::default(), centre, scale, cost: None, narrow: 1.0, from_start: None }
+            .into();
     let columns = StoredStates::of(N, (0..3).map(column).collect());
     Snapshot { figures, estimate, states: vec![None, Some(States::Stored(columns))] }
 }
