@@ -157,7 +157,7 @@ fn estimates(summary: &Summary) -> Vec<Vec<String>> {
         if both { &["95 % given the residuals", "95 % at the stated noise"] } else { &["95 % interval"] };
     let head = ["parameter", "unit", "estimate"].iter().chain(intervals).chain(&["prior median"]);
     let mut rows = vec![head.map(|title| (*title).to_owned()).collect::<Vec<_>>()];
-    let text = |ends: [f64; 2], sd| format!("{} … {}", end(ends[0], ends, sd), end(ends[1], ends, sd));
+    let text = |ends: [f64; 2], sd| format!("{} … {}", bound(ends[0], ends, sd), bound(ends[1], ends, sd));
     for p in &summary.parameters {
         let given = p.interval95_given_residuals.zip(p.sd_given_residuals).filter(|_| both);
         let sd = given.map_or(p.sd, |(_, sd)| sd);
@@ -172,7 +172,7 @@ fn estimates(summary: &Summary) -> Vec<Vec<String>> {
 
 /// An end of an interval, with the digits that the sd justifies, or those of its width where that is far more than any number of them: the ends
 /// of a logarithm that is not known have no digits in the units of the sd at the estimate.
-fn end(value: f64, [lo, hi]: [f64; 2], sd: f64) -> String {
+fn bound(value: f64, [lo, hi]: [f64; 2], sd: f64) -> String {
     let width = 0.25 * (hi - lo);
     number(value, Some(if width > FAR_WIDER * sd { width } else { sd }))
 }
@@ -262,7 +262,14 @@ fn moved(n: usize, runs: u64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::moved;
+    use super::{bound, moved};
+
+    #[test]
+    fn the_ends_of_an_interval_have_the_digits_of_their_sd_or_of_a_width_that_is_out_of_proportion() {
+        let both = |ends: [f64; 2], sd| ends.map(|value| bound(value, ends, sd));
+        assert_eq!(both([0.9804, 1.0196], 0.01), ["0.980", "1.020"]);
+        assert_eq!(both([1.8e-15, 7.630_362_043_476e10], 0.0057)[1], "7.6e10");
+    }
 
     #[test]
     fn one_constant_is_a_constant() {

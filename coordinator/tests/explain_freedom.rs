@@ -1,10 +1,10 @@
 //! Models with more freedom than the data: rates of which only quotients show, and records of a dozen values.
 #![allow(missing_docs, clippy::unwrap_used)]
 
-mod reactor_kit;
+mod explained_kit;
 mod study_kit;
 
-use reactor_kit::explained;
+use explained_kit::explained;
 use starlings_coordinator::explain::Verdict;
 use starlings_coordinator::study::twin::{Twin, simulate};
 use study_kit::{Case, csv, grid, normals};

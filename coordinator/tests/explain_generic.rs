@@ -1,10 +1,12 @@
 //! Terms of no field, for models whose states have no role, and families of candidates that a study leaves out.
 #![allow(missing_docs, clippy::unwrap_used)]
 
+mod explained_kit;
 mod reactor_kit;
 mod study_kit;
 
-use reactor_kit::{NOISE, explained, reactor, recorded};
+use explained_kit::explained;
+use reactor_kit::{NOISE, reactor, recorded};
 use starlings_coordinator::explain::{Explanation, Kind, Options, Verdict, candidates};
 use starlings_coordinator::study::twin::{Twin, simulate};
 use study_kit::{Case, csv, grid, normals};

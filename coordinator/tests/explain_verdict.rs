@@ -2,10 +2,12 @@
 //! term, data that cannot tell effects apart. The sentences are those that the user reads.
 #![allow(missing_docs, clippy::unwrap_used)]
 
+mod explained_kit;
 mod reactor_kit;
 mod study_kit;
 
-use reactor_kit::{NOISE, explained, reactor, recorded};
+use explained_kit::explained;
+use reactor_kit::{NOISE, reactor, recorded};
 use starlings_coordinator::explain::{ExplainError, Explanation, Verdict};
 use starlings_coordinator::study::Study;
 use study_kit::{Case, csv, grid, normals};

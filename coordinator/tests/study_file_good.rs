@@ -269,8 +269,11 @@ channels = [{ column = "x", output = "seen", noise = 0.01 }]
 "#;
 
 fn ball(study: &str) -> Study {
-    let rows = (0..20).map(|k| format!("{k},{},0\n", k * k)).collect::<String>();
-    load(study, &[("fall.csv", "time,x,zero\n".to_owned() + &rows)])
+    let mut text = "time,x,zero\n".to_owned();
+    for k in 0..20 {
+        writeln!(text, "{k},{},0", k * k).unwrap();
+    }
+    load(study, &[("fall.csv", text)])
 }
 
 #[test]
