@@ -4,7 +4,7 @@ mod common;
 
 use common::setup;
 use starlings_models::equations::{EquationsDef, OutputDef, StateDef};
-use starlings_models::{BuildSetup, Forward, ModelDef, Setup, SetupError, Window};
+use starlings_models::{BuildSetup, ModelDef, Setup, SetupError, Window};
 
 fn refused(change: impl FnOnce(&mut Setup)) -> SetupError {
     let (mut setup, _) = setup("windkessel-3");
