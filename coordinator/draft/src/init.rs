@@ -14,6 +14,7 @@ mod predicted;
 mod prior;
 mod recording;
 mod roles;
+mod row_numbers;
 mod separator;
 mod sheet;
 mod text;

@@ -7,12 +7,10 @@ use std::path::{Path, PathBuf};
 use super::cells::{is_missing, number};
 use super::header::{is_time, label, name_and_unit, time_unit};
 use super::moment::{Moment, order_of};
+use super::row_numbers::numbers_rows;
 use super::sheet::{Sheet, sheet};
 use super::{Ask, Question};
 use crate::names::Names;
-
-/// Headings under which tables of R and pandas number their rows.
-const ROW_NUMBERS: [&str; 8] = ["", "X", "rownames", "row", "Row", "index", "Index", "Unnamed: 0"];
 
 /// What one file holds.
 #[derive(Debug)]
@@ -156,15 +154,6 @@ impl Times {
     fn counted(n: usize, step: f64) -> Self {
         Self { values: (0..n).map(|row| row as f64 * step).collect(), clock: None, of_dates: false }
     }
-}
-
-/// Whether a column does nothing but number the rows, as tables of R and pandas are written.
-fn numbers_rows(sheet: &Sheet, at: usize) -> bool {
-    let is_named = ROW_NUMBERS.contains(&sheet.headers[at].trim());
-    let cells = || sheet.rows.iter().map(|row| number(&row[at]));
-    let start = cells().next().flatten().filter(|start| [0.0, 1.0].contains(start));
-    is_named
-        && start.is_some_and(|start| cells().enumerate().all(|(row, cell)| cell == Some(start + row as f64)))
 }
 
 /// The column of the times: as it was asked for, by its name, or the first that increases.

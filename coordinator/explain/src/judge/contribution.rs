@@ -8,8 +8,9 @@ use super::search_result::SearchResult;
 
 /// Share of the fall of χ² that a further effect must contribute.
 pub(crate) const SECOND_SHARE: f64 = 0.1;
-/// Share below which what a further effect adds is something small that remains, and says nothing against its partner.
-const SMALL_SHARE: f64 = 0.01;
+/// Share below which what a further effect adds is something small that remains, and says nothing against its partner, and below which an
+/// effect alone takes nothing of a gap away.
+pub(crate) const SMALL_SHARE: f64 = 0.01;
 /// Effective variance of the residuals above which they count as a discrepancy of another kind, not as a wrong form of the
 /// effect.
 pub(crate) const DISCREPANT: f64 = 20.0;

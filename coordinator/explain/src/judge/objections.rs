@@ -3,7 +3,7 @@
 //! Next file to read: [`super::held_out`].
 
 use super::adequacy::{AS_STATED, Adequacy, Nature};
-use super::contribution::SECOND_SHARE;
+use super::contribution::{SECOND_SHARE, SMALL_SHARE};
 use super::form::{Leftover, white_noise, white_share};
 use super::gates::JudgedFit;
 use super::held_out::{FAR, forbidding};
@@ -13,8 +13,6 @@ use crate::screen::screening_result::ScreeningResult;
 
 /// How the study says that a noise was given and not found.
 const GIVEN: &str = "given";
-/// Share of the gap below which an effect takes nothing of it away.
-const NOTHING: f64 = 0.01;
 /// Share of white noise in the residuals above which the rest of them must be white too ...
 const AUDIBLE: f64 = 0.12;
 /// ... if their effective variance is above this.
@@ -35,12 +33,12 @@ pub(crate) fn nearest_refused(found: &SearchResult<'_>) -> String {
         || nothing_refitted(found),
         |(judged, refusal)| {
             let name = judged.fit.variant.name();
-            if judged.share < NOTHING {
+            if judged.share < SMALL_SHARE {
                 return format!(
                     "none of the {} that were refitted takes away as much as {:.0} % of the gap on the training data, `{name}` least \
                      badly",
                     found.judged.len(),
-                    100.0 * NOTHING
+                    100.0 * SMALL_SHARE
                 );
             }
             format!(
