@@ -4,10 +4,9 @@
 mod explained_kit;
 mod study_kit;
 
-use explained_kit::explained;
+use explained_kit::{explained, noisy};
 use starlings_coordinator::explain::Verdict;
-use starlings_coordinator::study::twin::{Twin, simulate};
-use study_kit::{Case, csv, grid, normals};
+use study_kit::{Case, csv, grid};
 
 /// A heated room of which the data tell U/C and P/C alone.
 const ROOM: &str = r#"
@@ -66,12 +65,7 @@ fn an_effect_is_found_in_a_model_whose_parameters_tell_quotients_only() {
     let heater: Vec<f64> = times.iter().map(|t| if (t / 7.0) as u64 % 3 == 1 { 2.0 } else { 0.3 }).collect();
     let recording = |air: &[f64]| csv("time,outside,heater,air", &[&times, &outside, &heater, air]);
     let truth = Case::new(&format!("{ROOM}{WALL}"), &[("week.csv", recording(&vec![17.0; times.len()]))]);
-    let values = [("U", 0.35), ("P", 4.0), ("C", 1.0)].map(|(name, value)| (name.to_owned(), value));
-    let twin =
-        Twin { values: values.into(), effects: vec![("wall".to_owned(), 0.9)], seed: 1, ..Twin::default() };
-    let made = simulate(&truth.study(), &twin).unwrap();
-    let clean = &made.values[made.columns.iter().position(|c| c == "air").unwrap()];
-    let noisy: Vec<f64> = clean.iter().zip(normals(times.len(), 5)).map(|(v, e)| v + 0.07 * e).collect();
+    let noisy = noisy(&truth, &[("U", 0.35), ("P", 4.0), ("C", 1.0)], ("wall", 0.9), "air", 0.07);
     let found = explained(&Case::new(ROOM, &[("week.csv", recording(&noisy))])).unwrap();
     assert_eq!(found.verdict, Verdict::Named, "{}", found.headline);
     assert_eq!(found.effects[0].name, "second-store", "{}", found.headline);

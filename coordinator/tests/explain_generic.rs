@@ -5,11 +5,10 @@ mod explained_kit;
 mod reactor_kit;
 mod study_kit;
 
-use explained_kit::explained;
+use explained_kit::{explained, noisy};
 use reactor_kit::{NOISE, reactor, recorded};
 use starlings_coordinator::explain::{Explanation, Kind, Options, Verdict, candidates};
-use starlings_coordinator::study::twin::{Twin, simulate};
-use study_kit::{Case, csv, grid, normals};
+use study_kit::{Case, csv, grid};
 
 /// Swings from far out, by two states without a role.
 const SWING: &str = r#"
@@ -92,16 +91,8 @@ fn found_in(
 ) -> Explanation {
     let times = grid(400, 0.05);
     let blank = csv("time,laser", &[&times, &vec![1.0; times.len()]]);
-    let twin = Twin {
-        values: values.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect(),
-        effects: vec![(name.to_owned(), amplitude)],
-        seed: 1,
-        ..Twin::default()
-    };
     let truth = Case::new(&format!("{study}{effect}"), &[("swing.csv", blank)]);
-    let made = simulate(&truth.study(), &twin).unwrap();
-    let clean = &made.values[made.columns.iter().position(|c| c == "laser").unwrap()];
-    let noisy: Vec<f64> = clean.iter().zip(normals(times.len(), 5)).map(|(v, e)| v + 0.01 * e).collect();
+    let noisy = noisy(&truth, values, (name, amplitude), "laser", 0.01);
     explained(&Case::new(study, &[("swing.csv", csv("time,laser", &[&times, &noisy]))])).unwrap()
 }
 

@@ -18,6 +18,7 @@ mod row_numbers;
 mod separator;
 mod sheet;
 mod text;
+mod times;
 mod unknowns;
 mod write;
 
@@ -100,7 +101,7 @@ pub fn init(wishes: &Wishes, out: &Path, host: &SolverHost, ask: Ask<'_>) -> Res
         return Err(DraftError::Taken(out.to_owned()));
     }
     let model = model::model(wishes, out, host, ask)?;
-    let time = recording::TimeWish { column: wishes.time.as_deref(), step: wishes.step };
+    let time = times::TimeWish { column: wishes.time.as_deref(), step: wishes.step };
     let mut recordings = Vec::new();
     for file in &wishes.recordings {
         let found = recording::recording(file, &time, ask);

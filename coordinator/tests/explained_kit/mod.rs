@@ -1,11 +1,12 @@
-//! The explanation of a study in this process.
-#![allow(missing_docs, unreachable_pub, clippy::unwrap_used)]
+//! The explanation of a study in this process, and recordings that are simulated with what it lacks.
+#![allow(dead_code, missing_docs, unreachable_pub, clippy::unwrap_used)]
 
 use starlings_coordinator::explain::{Context, ExplainError, Explanation, Options, check, explain};
 use starlings_coordinator::fleet::InProcess;
 use starlings_coordinator::study::store::Store;
+use starlings_coordinator::study::twin::{Twin, simulate};
 
-use crate::study_kit::Case;
+use crate::study_kit::{Case, normals};
 
 /// The explanation of a study in this process, after the checks of the command.
 pub fn explained(case: &Case) -> Result<Explanation, ExplainError> {
@@ -15,4 +16,23 @@ pub fn explained(case: &Case) -> Result<Explanation, ExplainError> {
     let store = Store::create(&path.join("run.db"), &[]).unwrap();
     let mut context = Context { clock: &|| 0.0, watch: &mut |_| {}, events: None, earlier_s: 0.0 };
     explain(&study, &mut InProcess::new(2), &store, &mut context, &Options::of(&study)).map(|f| f.explanation)
+}
+
+/// What a column holds of a recording that is made by this study with these values and effect, and noise of this sd.
+pub fn noisy(
+    truth: &Case,
+    values: &[(&str, f64)],
+    (effect, size): (&str, f64),
+    column: &str,
+    sd: f64,
+) -> Vec<f64> {
+    let twin = Twin {
+        values: values.iter().map(|(name, value)| ((*name).to_owned(), *value)).collect(),
+        effects: vec![(effect.to_owned(), size)],
+        seed: 1,
+        ..Twin::default()
+    };
+    let made = simulate(&truth.study(), &twin).unwrap();
+    let clean = &made.values[made.columns.iter().position(|c| c == column).unwrap()];
+    clean.iter().zip(normals(clean.len(), 5)).map(|(v, e)| v + sd * e).collect()
 }
