@@ -94,7 +94,7 @@ fn finish(cache: &mut RunCache<'_>, diagnosis: &Diagnosis<'_, '_>) -> Result<Fin
     let added = judged.filter(|_| matches!(decision.verdict, Verdict::Named | Verdict::Tie));
     before.forces = with_terms(forces, found, added, tracks);
     cache.stage("add", "");
-    let mut warnings = warnings::warnings(cache, found, decision);
+    let mut warnings = warnings::warnings(cache, found, candidates, decision);
     warnings.extend(cache.told_of_workers()?);
     let explained = match added {
         Some(judged) => {

@@ -17,15 +17,13 @@ use super::summary::Summary;
 use super::{Fit, Study};
 
 /// Correlation above which two parameters are reported as one combination.
-pub(super) const CORRELATED: f64 = 0.95;
+pub const CORRELATED: f64 = 0.95;
 /// Share of the prior sd above which the data are said not to inform a parameter, or a combination of parameters.
 pub(super) const UNINFORMED: f64 = 0.9;
 /// Share of the spread that resampling may leave out without a warning.
 const DROPPED: f64 = 0.05;
 /// Prior standard deviations beyond which an estimate contradicts its prior.
-const FAR_FROM_PRIOR: f64 = 4.0;
-/// NIS per observation above which an estimate far from its prior may make up for what the model lacks.
-const UNEXPLAINED: f64 = 1.5;
+pub const FAR_FROM_PRIOR: f64 = 4.0;
 /// Share of the distance between two bounds within which an estimate sits at one of them.
 const AT_BOUND: f64 = 0.01;
 
@@ -55,17 +53,18 @@ pub(crate) fn collect(
 
 fn not_converged(study: &Study, fit: &Fit) -> Option<String> {
     let kind = study.estimator.kind.name;
-    (!fit.converged).then(|| {
-        if fit.posterior.mean == prior(study).mean {
-            return format!(
-                "the {kind} fit took no step before its iteration limit: the estimates are the prior medians, and their intervals belong to \
-                 these. Raise [estimator] max_iterations."
-            );
-        }
-        format!(
-            "the {kind} fit stopped at its iteration limit before it converged: raise [estimator] max_iterations"
-        )
-    })
+    if fit.converged {
+        return None;
+    }
+    if fit.posterior.mean == prior(study).mean {
+        return Some(format!(
+            "the {kind} fit took no step before its iteration limit: the estimates are the prior medians, and the intervals are those around \
+             them. Raise [estimator] max_iterations."
+        ));
+    }
+    Some(format!(
+        "the {kind} fit stopped at its iteration limit before it converged: raise [estimator] max_iterations"
+    ))
 }
 
 /// A whole-record run has one value of each parameter, however much it may drift.
@@ -144,13 +143,14 @@ fn far_from_prior(study: &Study, fit: &Fit) -> Vec<String> {
             let estimate = entry.transform.to_physical(fit.posterior.mean[j]);
             (distance > FAR_FROM_PRIOR).then(|| {
                 // What a model lacks is made up for by whatever can.
-                let lacks = if fit.nis_per_observation() > UNEXPLAINED {
-                    "the model may lack what that makes up for (`starlings explain`); else "
+                let is_unexplained = fit.nis_per_observation() > consistency::FAR_ABOVE;
+                let lacks = if is_unexplained {
+                    "; or the model lacks what it makes up for: see `starlings explain`"
                 } else {
                     ""
                 };
                 format!(
-                    "{} is {distance:.1} prior standard deviations from its prior median: {lacks}{}.",
+                    "{} is {distance:.1} prior standard deviations from its prior median: {}{lacks}.",
                     entry.name,
                     far_remedy(entry.transform, estimate)
                 )

@@ -130,6 +130,11 @@ impl Adequacy {
         matches!(self.nature(), Nature::Correlated | Nature::Larger)
     }
 
+    /// Whether they show that the model lacks something, and not the errors of its simulation or the digits of a file.
+    pub(crate) fn is_gap_of_the_model(&self) -> bool {
+        self.is_gap() && !self.is_numerical()
+    }
+
     /// Whether a gap shows, or the residuals are at least larger than chance leaves them.
     pub(crate) fn may_hide_a_gap(&self) -> bool {
         self.is_gap() || (self.n > 0 && self.rmse_over_noise.powi(2) > self.band(DOUBTED).1)

@@ -41,12 +41,7 @@ pub(crate) fn check_contributions(found: &SearchResult<'_>, passing: &[usize]) -
     });
     let Some(alone) = alone else { return all };
     let part = &found.judged[alone];
-    let share = |of: fn(&Misfit) -> f64| {
-        let whole_fall = of(&found.before) - of(&whole.misfit);
-        (of(&part.misfit) - of(&whole.misfit)) / whole_fall.max(f64::MIN_POSITIVE)
-    };
-    let train = share(|m| m.train);
-    let held_out = (whole.misfit.n_held_out > 0).then(|| share(|m| m.held_out));
+    let (train, held_out) = shares(found, &whole.misfit, &part.misfit);
     if carries_its_share(train, held_out) {
         return all;
     }
@@ -65,8 +60,17 @@ pub(crate) fn check_contributions(found: &SearchResult<'_>, passing: &[usize]) -
     ContributionCheck { best: alone, checked: alone, because: Some(because) }
 }
 
-/// Whether a further effect carries its share of the fall of χ², of what was fitted and of what was held out. No fit has seen the latter: what
-/// it shows makes up for a small share of the former.
+/// The share of a whole's fall of χ² that a part of it lacks: of the training rows, and of the held-out span where there is one.
+pub(crate) fn shares(found: &SearchResult<'_>, whole: &Misfit, part: &Misfit) -> (f64, Option<f64>) {
+    let share = |of: fn(&Misfit) -> f64| {
+        let fall = of(&found.before) - of(whole);
+        (of(part) - of(whole)) / fall.max(f64::MIN_POSITIVE)
+    };
+    (share(|m| m.train), (whole.n_held_out > 0).then(|| share(|m| m.held_out)))
+}
+
+/// Whether a further effect carries its share of the fall of χ²: a tenth of what was held out, and of both on average. No fit has seen what was
+/// held out: what it shows makes up for a small share of the rest.
 pub(crate) fn carries_its_share(train: f64, held_out: Option<f64>) -> bool {
     match held_out {
         None => train >= SECOND_SHARE,

@@ -6,6 +6,7 @@
 
 use starlings_estimators::End;
 use starlings_models::units::spaced;
+use starlings_study::listed;
 
 use super::adequacy::Adequacy;
 use super::form::Leftover;
@@ -189,14 +190,22 @@ fn refusal(
         })
 }
 
-/// That what speaks for a variant does not make up for how unlikely its kind is before any data, in words.
+/// That all data together speak for a variant no more than chance does, or not enough to make up for how unlikely its effects are before
+/// any data, in words.
 fn too_unlikely(judged: &JudgedFit<'_>, threshold: f64) -> String {
-    let kinds: Vec<&str> = judged.kinds().into_iter().map(Kind::plural).collect();
+    let [rank, price] = [judged.rank(), judged.prior()].map(|of| of / judged.inflation);
+    let chance = format!("a search like this one reaches {threshold:.1} by chance");
+    if rank <= threshold {
+        return format!(
+            "what was held out takes away what the training data bring: in units of the effective noise both are {rank:.1}, where {chance}"
+        );
+    }
+    let mut kinds: Vec<&str> = judged.kinds().into_iter().map(Kind::plural).collect();
+    kinds.dedup();
     format!(
-        "all data together speak for it with {:.1} in units of the effective noise, where a search like this one reaches {threshold:.1} by \
-         chance: less than makes up for how unlikely {} are before any data, so that nothing being missing stays likelier",
-        judged.rank() / judged.inflation,
-        kinds[0]
+        "all data together speak for it with {rank:.1} in units of the effective noise, of which {price:.1} make up for how unlikely {} are \
+         before any data; {chance}, so that nothing being missing stays likelier",
+        listed(&kinds)
     )
 }
 

@@ -121,7 +121,7 @@ pub(crate) fn probabilities(
     let listed = 1.0 / (1.0 + of_verdict);
     let left = best.filter(|_| is_answered).map(|j| &j.adequacy);
     let listed = left.map_or(listed, |left| still_listed(listed, left, discrepancy));
-    Some(shared(weights, listed, discrepancy).with_gap(found.adequacy.is_gap()))
+    Some(shared(weights, listed, discrepancy).with_gap(found.adequacy.is_gap_of_the_model()))
 }
 
 /// How often a verdict falls where the truth is in no list, over how often where it is.

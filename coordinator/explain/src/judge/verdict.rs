@@ -82,8 +82,7 @@ pub(crate) fn decide(
     };
     let passing = found.passing();
     if passing.is_empty() {
-        let is_gap = found.adequacy.is_gap() && !found.adequacy.is_numerical();
-        return Ok(if is_gap || found.held_out.iter().any(|h| h.fails) {
+        return Ok(if found.adequacy.is_gap_of_the_model() || found.held_out.iter().any(|h| h.fails) {
             none(Verdict::Unexplained, None, &nearest_refused(found))
         } else {
             none(Verdict::NoGap, None, "")

@@ -7,10 +7,11 @@
 use serde::{Deserialize, Serialize};
 use starlings_models::effect::library::{FAMILIES, shows_in};
 use starlings_models::{BuildSetup, EffectDef, Quantity, Role, Setup, Spec};
-use starlings_study::{Study, checked::Library};
+use starlings_study::{Study, checked::Library, listed};
 
 use super::candidates::fitted_outputs;
 use crate::fit::candidate::Candidate;
+use crate::fit::kind::Kind;
 
 /// States that a sentence names at most.
 const MOST: usize = 6;
@@ -80,7 +81,7 @@ pub(crate) fn sentence(study: &Study, candidates: &[Candidate]) -> String {
     let names = if names.len() > MOST {
         format!("{} and {} more", names[..MOST - 1].join(", "), names.len() + 1 - MOST)
     } else {
-        joined(&names)
+        listed(&names)
     };
     let equations = if open.len() == 1 { "equation" } else { "equations" };
     let roleless = open.iter().all(|(_, role)| *role == Role::Other);
@@ -98,9 +99,16 @@ pub(crate) fn sentence(study: &Study, candidates: &[Candidate]) -> String {
     format!("No candidate adds a term to the {equations} of {names}{why}; {remedy}.")
 }
 
-/// That no state of the equations has a role from which effects of the library grow, with the families that found no place for it.
-pub(crate) fn without_roles(study: &Study) -> Option<String> {
-    if study.explain.library == Library::Study || study.setup.model.equations.is_none() {
+/// That no state of the equations has a role from which effects of the library grow, with the families that found no place for it; nothing where
+/// effects of a field were tried, or [`sentence`] tells it.
+pub(crate) fn without_roles(study: &Study, candidates: &[Candidate]) -> Option<String> {
+    let has_physics = candidates.iter().any(|candidate| candidate.kind == Kind::Library);
+    let is_told = !sentence(study, candidates).is_empty();
+    if has_physics
+        || is_told
+        || study.explain.library == Library::Study
+        || study.setup.model.equations.is_none()
+    {
         return None;
     }
     let bare = Setup { model: study.setup.model.clone(), ..Setup::default() };
@@ -111,18 +119,9 @@ pub(crate) fn without_roles(study: &Study) -> Option<String> {
         format!(
             "no state has a role, nor a unit that tells it: effects of the families {} found no place, and what was tried of the \
              library are errors of instruments and terms of no particular physics; give `role` in [[model.states]]",
-            joined(&without)
+            listed(&without)
         )
     })
-}
-
-/// Names joined by commas and an `and`.
-fn joined(names: &[&str]) -> String {
-    match names {
-        [] => String::new(),
-        [only] => (*only).to_owned(),
-        [first @ .., last] => format!("{} and {last}", first.join(", ")),
-    }
 }
 
 /// What a family needs, as part of another sentence.

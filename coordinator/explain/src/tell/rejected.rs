@@ -6,9 +6,8 @@ use starlings_models::units::spaced;
 
 use super::result::Rejected;
 use crate::fit::candidate::Candidate;
-use crate::judge::contribution::carries_its_share;
+use crate::judge::contribution::{carries_its_share, shares};
 use crate::judge::gates::JudgedFit;
-use crate::judge::misfit::Misfit;
 use crate::judge::search_result::SearchResult;
 use crate::judge::verdict::Decision;
 use crate::number::three;
@@ -81,18 +80,14 @@ fn behind(found: &SearchResult<'_>, decision: &Decision, i: usize) -> String {
     let judged = &found.judged[i];
     let name = best.fit.variant.name();
     if judged.fit.variant.effects.len() > best.fit.variant.effects.len() {
-        let of = |share: fn(&Misfit) -> f64| {
-            let (whole, part) = (share(&judged.misfit), share(&best.misfit));
-            100.0 * (part - whole) / (share(&found.before) - whole).max(f64::MIN_POSITIVE)
-        };
-        let train = of(|m| m.train);
-        let held_out = (judged.misfit.n_held_out > 0).then(|| of(|m| m.held_out));
-        if !carries_its_share(train / 100.0, held_out.map(|h| h / 100.0)) {
+        let (train, held_out) = shares(found, &judged.misfit, &best.misfit);
+        if !carries_its_share(train, held_out) {
             return format!(
-                "beyond `{name}` it takes away {train:.1} % of the gap on the training data{}: a further effect must carry a tenth of \
-                 it{}",
-                held_out.map_or_else(String::new, |h| format!(" and {h:.1} % on the held-out span")),
-                if held_out.is_some() { ", and of what was held out" } else { "" }
+                "beyond `{name}` it takes away {:.1} % of the gap on the training data{}: a further effect must carry a tenth of {}",
+                100.0 * train,
+                held_out
+                    .map_or_else(String::new, |h| format!(" and {:.1} % on the held-out span", 100.0 * h)),
+                if held_out.is_some() { "what was held out, and of both on average" } else { "it" }
             );
         }
     }

@@ -3,7 +3,7 @@
 //! Next file to read: [`super::words`].
 
 use starlings_models::{BuildSetup, SOLVER};
-use starlings_study::Study;
+use starlings_study::{FAR_FROM_PRIOR, Study, listed as joined};
 
 use super::correlated;
 use crate::fit::candidate::Candidate;
@@ -20,8 +20,6 @@ use crate::rows::Usage;
 use crate::run_cache::RunCache;
 use crate::screen::not_tried;
 
-/// Prior standard deviations beyond which an estimate contradicts its prior.
-const FAR_FROM_PRIOR: f64 = 4.0;
 /// Distance in noise sd within which two simulated values are the same.
 const SAME: f64 = 0.01;
 
@@ -88,9 +86,9 @@ fn far_from_prior(base: &FittedVariant<'_>) -> Option<String> {
     let far: Vec<String> = names.map(|(z, entry)| format!("{} ({:.1})", entry.name, z.abs())).collect();
     (!far.is_empty()).then(|| {
         format!(
-            "the model as it is comes nearest to the data far from its priors, in prior standard deviations: {}. Effects were scored there, \
-             where they may do something else than near the priors: narrower ones keep the model where it is meant",
-            far.join(", ")
+            "the model as it is comes nearest to the data far from its priors, in prior standard deviations: {}. Effects were scored at these \
+             values; narrower priors keep the model where it is meant",
+            joined(&far)
         )
     })
 }
@@ -126,7 +124,12 @@ pub(crate) fn of_candidates(study: &Study, candidates: &[Candidate]) -> Vec<Stri
 }
 
 /// All warnings.
-pub(crate) fn warnings(cache: &RunCache<'_>, found: &SearchResult<'_>, decision: &Decision) -> Vec<String> {
+pub(crate) fn warnings(
+    cache: &RunCache<'_>,
+    found: &SearchResult<'_>,
+    candidates: &[Candidate],
+    decision: &Decision,
+) -> Vec<String> {
     let mut list = Vec::new();
     if found.cut_short {
         list.push(format!(
@@ -157,7 +160,7 @@ pub(crate) fn warnings(cache: &RunCache<'_>, found: &SearchResult<'_>, decision:
         ));
     }
     if is_without_physics(found, decision) {
-        list.extend(not_tried::without_roles(cache.study));
+        list.extend(not_tried::without_roles(cache.study, candidates));
     }
     if decision.verdict != Verdict::NoGap {
         list.extend(far_from_prior(&found.base));

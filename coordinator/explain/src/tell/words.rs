@@ -5,7 +5,8 @@
 
 use std::fmt::Write as _;
 
-use starlings_study::posterior;
+use starlings_estimators::correlation;
+use starlings_study::{CORRELATED, posterior};
 
 use super::correlated::{correlated_noise, listed as listed_noise};
 use super::errors::shrinking;
@@ -26,9 +27,6 @@ use crate::screen::not_tried;
 /// Share of the gap below which what is left is not spoken of: with one digit it would read as nothing.
 const LITTLE: f64 = 5e-4;
 
-/// Correlation from which on two parameters stand in for each other.
-const EXCHANGED: f64 = 0.98;
-
 /// Where a fit stands that has not converged.
 pub(crate) fn stand(fit: &FittedVariant<'_>) -> String {
     let n = fit.residual().len().max(1) as f64;
@@ -39,17 +37,15 @@ pub(crate) fn stand(fit: &FittedVariant<'_>) -> String {
 /// The two parameters that stand in for each other most, where they do.
 fn exchanged(fit: &FittedVariant<'_>) -> String {
     let Ok(optimum) = fit.optimum() else { return String::new() };
-    let covariance = optimum.covariance();
     let theta = &fit.variant.study.theta;
-    let pairs = (0..covariance.nrows()).flat_map(|j| (0..j).map(move |i| (i, j)));
-    let correlated = pairs.map(|(i, j)| {
-        let value = covariance[(i, j)] / (covariance[(i, i)] * covariance[(j, j)]).sqrt();
-        (i, j, value)
-    });
-    let most = correlated.filter(|(_, _, value)| value.abs() > EXCHANGED);
-    let Some((i, j, value)) = most.max_by(|a, b| a.2.abs().total_cmp(&b.2.abs())) else {
+    let correlation = correlation(optimum.covariance());
+    let pairs = (0..correlation.nrows()).flat_map(|j| (0..j).map(move |i| (i, j)));
+    let strength = |(i, j): &(usize, usize)| correlation[(*i, *j)].abs();
+    let strong = pairs.filter(|pair| strength(pair) > CORRELATED);
+    let Some((i, j)) = strong.max_by(|a, b| strength(a).total_cmp(&strength(b))) else {
         return String::new();
     };
+    let value = correlation[(i, j)];
     format!(
         ", where {} and {} stand in for each other (correlation {value:.4}): fix one or give it a narrower prior",
         theta[i].name, theta[j].name

@@ -9,7 +9,7 @@ use toml::Spanned;
 
 use super::layout::Layout;
 use super::quantity::{named_role, role, unit};
-use super::roles::told_by_rates;
+use super::roles::{told_by_rates, told_by_unit};
 use super::solver::{self, program};
 use super::table::{Node, Table, named_texts, number, text, wrong_type};
 use super::{
@@ -129,7 +129,7 @@ fn quantities(
     let read = |t: Table<'_>| QuantitySection {
         name: t.required_text("name", "how other parts of the study call it"),
         unit: unit(&t),
-        role: role(source, &t).unwrap_or_default(),
+        role: role(source, &t).or_else(|| told_by_unit(&unit(&t))).unwrap_or_default(),
         value: if with_value {
             t.required_text("value", "an expression such as \"x\"")
         } else {
@@ -160,7 +160,7 @@ fn state(source: &Source, t: &Table<'_>) -> StateSection {
     StateSection {
         name: t.required_text("name", "how expressions call the state"),
         unit: unit(t),
-        role: role(source, t),
+        role: role(source, t).or_else(|| told_by_unit(&unit(t))),
         initial: t.get("initial").and_then(|node| value(source, node, "`initial`")).unwrap_or(zero),
         rate: t.get("rate").map(|node| rate(source, t, node)).unwrap_or_default(),
         noise: t.get("noise").map(|node| noise(source, t, node)).unwrap_or_default(),

@@ -8,7 +8,6 @@ use serde::de::value::StrDeserializer;
 use starlings_models::Role;
 use toml::Spanned;
 
-use super::roles::told_by_unit;
 use super::table::Table;
 use crate::problem::Source;
 
@@ -37,9 +36,9 @@ pub(super) fn unit(t: &Table<'_>) -> String {
     t.text("unit").map(Spanned::into_inner).unwrap_or_default()
 }
 
-/// The role that is written, else the one that the unit tells.
+/// The role that is written.
 pub(super) fn role(source: &Source, t: &Table<'_>) -> Option<Role> {
-    t.text("role").map(|name| named_role(source, &name)).or_else(|| told_by_unit(&unit(t)))
+    t.text("role").map(|name| named_role(source, &name))
 }
 
 /// The role of this name; an unknown one is reported.

@@ -1,6 +1,6 @@
 //! Roles that a study does not write: what the unit of a quantity tells, and the equation x' = v.
 //!
-//! A written role stands, `other` as well. Next file to read: [`super::quantity`].
+//! A written role stands, `other` as well, but that an output which is nothing but a state means what that means. Next file to read: [`super::quantity`].
 
 use starlings_models::Role;
 use starlings_models::units::Unit;

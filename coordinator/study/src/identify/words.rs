@@ -43,7 +43,7 @@ pub fn combination(names: &[&str], direction: &Direction) -> String {
 }
 
 /// `a`, `a and b`, `a, b and c`.
-pub(crate) fn listed<S: AsRef<str>>(names: &[S]) -> String {
+pub fn listed<S: AsRef<str>>(names: &[S]) -> String {
     let text = |names: &[S]| names.iter().map(AsRef::as_ref).collect::<Vec<_>>().join(", ");
     match names {
         [first @ .., last] if !first.is_empty() => format!("{} and {}", text(first), last.as_ref()),

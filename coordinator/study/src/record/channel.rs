@@ -103,12 +103,13 @@ impl ChannelReader<'_> {
 
     /// A noise that the study does not give.
     fn found_noise(&self, section: &ChannelSection, noise: &Noise, label: &str) -> Option<FoundNoise> {
-        noise.how.starts_with("from").then(|| FoundNoise {
+        noise.found_from.is_some().then(|| FoundNoise {
             output: section.output.get_ref().clone(),
             record: self.name().to_owned(),
             sd: noise.sd,
             unit: label.to_owned(),
             how: noise.how.clone(),
+            is_uneven: !self.is_even(),
         })
     }
 

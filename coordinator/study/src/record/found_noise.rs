@@ -8,7 +8,6 @@ use crate::problem::quoted_list;
 /// Records that a warning names; of more it tells their number.
 const NAMED: usize = 3;
 const CURE: &str = "Give the sensor's standard deviation if it is known.";
-const UNEVEN: &str = "not evenly spaced";
 
 /// A noise that was found from what a record holds of an output.
 #[derive(Clone, Debug)]
@@ -21,15 +20,20 @@ pub(crate) struct FoundNoise {
     pub(super) unit: String,
     /// From what, beginning with "from".
     pub(super) how: String,
+    /// Whether the samples are not evenly spaced, so that it may be too large.
+    pub(super) is_uneven: bool,
 }
 
-/// One warning per output, in the order in which outputs were first seen.
+/// One warning per output and unit, in the order in which they were first seen.
 pub(crate) fn warnings(found: &[FoundNoise]) -> Vec<String> {
-    let is_first = |i: &usize| found[..*i].iter().all(|f| f.output != found[*i].output);
-    let firsts = (0..found.len()).filter(is_first);
-    firsts
-        .map(|i| warning(&found.iter().filter(|f| f.output == found[i].output).collect::<Vec<_>>()))
-        .collect()
+    let mut groups: Vec<Vec<&FoundNoise>> = Vec::new();
+    for f in found {
+        match groups.iter_mut().find(|group| (&group[0].output, &group[0].unit) == (&f.output, &f.unit)) {
+            Some(group) => group.push(f),
+            None => groups.push(vec![f]),
+        }
+    }
+    groups.iter().map(|group| warning(group)).collect()
 }
 
 /// What was found of one output.
@@ -43,19 +47,18 @@ fn warning(found: &[&FoundNoise]) -> String {
             found[0].how
         );
     }
-    let (least, most) = found.iter().fold((found[0], found[0]), |(least, most), f| {
-        (if f.sd < least.sd { f } else { least }, if f.sd > most.sd { f } else { most })
-    });
-    let uneven = if found.iter().any(|f| f.how.contains(UNEVEN)) {
-        format!(" (some are {UNEVEN}: it may be too large)")
+    let least = found.iter().map(|f| f.sd).fold(f64::INFINITY, f64::min);
+    let most = found.iter().map(|f| f.sd).fold(0.0, f64::max);
+    let uneven = if found.iter().any(|f| f.is_uneven) {
+        " (some are not evenly spaced: it may be too large)"
     } else {
-        String::new()
+        ""
     };
     format!(
         "the noise of `{output}` in {records} was not given: {} to {} were found from the third differences of their \
          samples{uneven}. {CURE}",
-        of(least),
-        of(most)
+        with_unit(least, &found[0].unit),
+        with_unit(most, &found[0].unit)
     )
 }
 
@@ -74,7 +77,7 @@ mod tests {
 
     fn found(output: &str, record: &str, sd: f64, how: &str) -> FoundNoise {
         let [output, record, unit, how] = [output, record, "K", how].map(str::to_owned);
-        FoundNoise { output, record, sd, unit, how }
+        FoundNoise { output, record, sd, unit, how, is_uneven: false }
     }
 
     #[test]
@@ -93,11 +96,11 @@ mod tests {
             "{said:?}"
         );
         all[1].sd = 0.03;
-        all[2].how =
-            "from the third differences of its 60 samples (which are not evenly spaced: it may be too large)"
-                .to_owned();
+        all[2].is_uneven = true;
         let said = warnings(&all);
         assert!(said[0].contains("in 4 records was not given: 0.02 K to 0.03 K were found"), "{said:?}");
         assert!(said[0].contains("some are not evenly spaced"), "{said:?}");
+        all[3].unit = "mK".to_owned();
+        assert_eq!(warnings(&all).len(), 3, "no range of two units");
     }
 }

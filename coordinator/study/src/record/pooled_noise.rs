@@ -6,6 +6,7 @@ use starlings_estimators::{n_third_difference, noise_from_third_differences};
 
 use super::found_noise::FoundNoise;
 use crate::checked::{Channel, Record};
+use crate::field::field_of;
 
 /// Third differences from which a record tells its noise alone: their median scatters by a fifth then, and by more with fewer.
 const ENOUGH: usize = 50;
@@ -46,7 +47,8 @@ pub(crate) fn pool_short_records(records: &mut [Record], found: &mut [FoundNoise
     for (r, c, sd, how, n_difference) in pooled {
         let Record { name, channels, .. } = &mut records[r];
         let channel = &mut channels[c];
-        let told = |f: &&mut FoundNoise| f.record == *name && f.output == channel.output;
+        let told =
+            |f: &&mut FoundNoise| f.record == *name && field_of(&f.output) == field_of(&channel.output);
         for told in found.iter_mut().filter(told) {
             (told.sd, told.how) = (sd, how.clone());
         }

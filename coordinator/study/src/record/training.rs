@@ -43,9 +43,9 @@ pub(super) fn span(
 pub(super) fn reaches_beyond(section: &RecordSection, times: &[f64]) -> Option<String> {
     let [_, to] = *section.train.as_ref()?.get_ref();
     let (first, last) = (*times.first()?, *times.last()?);
-    (to > last + (last - first)).then(|| {
+    (to.is_finite() && last > first && to > last + (last - first)).then(|| {
         format!(
-            "`train` of record `{}` ends at {to}, its samples at {last}: nothing of it is held out. Are both in the study's `time_unit`?",
+            "`train` of record `{}` ends at {to}, its samples at {last}: nothing behind it is held out. Are both in the study's `time_unit`?",
             section.name.get_ref()
         )
     })

@@ -12,6 +12,8 @@ use crate::{Fit, Study, fit::settle, posterior};
 
 /// Probability with which NIS of a right model stays within its band.
 const LEVEL: f64 = 0.998;
+/// NIS per observation that is far above one.
+pub(super) const FAR_ABOVE: f64 = 1.5;
 /// Probability of a false alarm about correlated residuals, over all series of a study.
 const CORRELATED_BY_CHANCE: f64 = 1e-3;
 /// Factor by which correlation must raise the variance of a mean to be reported, where it is certain but not strong.
@@ -38,7 +40,7 @@ pub(super) fn nis(fit: &Fit, residuals: &[Residuals]) -> Option<String> {
     let (lo, hi) = effective_nis_band(n, LEVEL);
     let band = format!("by chance {lo:.2} to {hi:.2}, with {n:.0} independent residuals");
     if ratio > hi {
-        let far = if ratio > 1.5 { "far above" } else { "above" };
+        let far = if ratio > FAR_ABOVE { "far above" } else { "above" };
         Some(format!(
             "NIS is {ratio:.2} per observation, {far} 1 ({band}): the model does not explain the data at the stated noise; \
              residuals are about {:.1} times the noise and the intervals at the stated noise too narrow. Look for a missing effect by `starlings explain`, or state \
