@@ -9,9 +9,8 @@ use std::path::{Path, PathBuf};
 use clap::Parser;
 use starlings_coordinator::report::locus::{Locus, render};
 use starlings_coordinator::study::Study;
-use starlings_coordinator::study::spectrum::{ExamineError, Spectrum, Wanted, examine};
+use starlings_coordinator::study::spectrum::{ExamineError, Spectrum, Wanted, examine, observer_names};
 use starlings_models::nearest;
-use starlings_models::observer::kinds;
 use starlings_models::spectrum::Decay;
 
 use crate::console::line;
@@ -67,8 +66,8 @@ fn decay(text: &str) -> Result<Decay, String> {
 
 /// Examines the observers and writes what was asked for.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
-    check(args)?;
     let study = load_for_poles(&args.study)?;
+    check(args, &observer_names(&study.setup.observer))?;
     csv_file::check_outputs(
         &[("--csv", &args.csv), ("--html", &args.html)],
         &study.text,
@@ -94,9 +93,9 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     if args.json { line(format_args!("{:#}", print::as_json(&found))) } else { print::text(&found) }
 }
 
-/// Refuses names and numbers that are wrong whatever the study is.
-fn check(args: &Args) -> Result<(), Failure> {
-    let known: Vec<&str> = kinds().iter().map(|kind| kind.kind).collect();
+/// Refuses names that are none of the study's, and numbers that are wrong.
+fn check(args: &Args, known: &[String]) -> Result<(), Failure> {
+    let known: Vec<&str> = known.iter().map(String::as_str).collect();
     if let Some(name) = args.observers.iter().find(|name| !known.contains(&name.as_str())) {
         let hint = nearest(name, &known).map(|n| format!("; did you mean `{n}`?")).unwrap_or_default();
         let known = known.join(", ");

@@ -171,6 +171,24 @@ fn a_pair_that_is_unstable_together_is_shown_with_the_factor_that_is_not() {
 }
 
 #[test]
+fn the_share_that_is_stable_is_the_largest_also_where_the_model_alone_grows() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("study.toml");
+    std::fs::write(&file, UNSTABLE.replace("/R1 - p2)\"", "/R1 + 0.5*p2)\"")).unwrap();
+    std::fs::write(folder.path().join("pair.csv"), "time,y1,y2\n0,270,280\n0.01,270,280\n0.02,270,280\n")
+        .unwrap();
+    let asked = ["--observers", "nudging of y1"];
+    let (code, stdout, stderr) = output(starlings().arg("spectrum").arg(&file).arg("--json").args(asked));
+    assert_eq!(code, 0, "{stderr}");
+    let found: Value = serde_json::from_str(&stdout).unwrap();
+    assert_eq!(found["observers"][0]["name"], "nudging of y1");
+    // The determinant of A − f Γ, −10/3 + 2020/3 f − 1920 f², is above zero between its zeros, 0.005 and this one.
+    let exact = (2020.0 + (2020.0_f64.powi(2) - 4.0 * 5760.0 * 10.0).sqrt()) / (2.0 * 5760.0);
+    let share = found["stable_share"].as_f64().unwrap();
+    assert!((share - exact).abs() < 1e-7, "{share} {exact}");
+}
+
+#[test]
 fn wrong_options_are_refused_with_the_remedy() {
     for (arguments, expected) in [
         (["--observers", "sfd"], "did you mean `sdf`?"),

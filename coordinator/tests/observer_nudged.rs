@@ -70,8 +70,8 @@ fn an_output_that_does_not_depend_on_the_state_that_it_corrects_is_refused() {
         "{refused}"
     );
     assert!(refused.contains("leave it out of `corrects`"), "{refused}");
-    // A square shows nothing at zero, where this run starts, and a product nothing while its input is off.
-    for value in ["x^2", "x*(1 + t) - x"] {
+    // A square shows nothing at zero, where this run starts, a product nothing while its input is off, and a valve nothing while it is shut.
+    for value in ["x^2", "x*(1 + t) - x", "max(x - 2, 0)"] {
         let square = study("turned = \"x\"", 1.0, 1.0, "").replace("\"-x\" }", &format!("\"{value}\" }}"));
         let told = told(&square.replace("initial = 1.0", "initial = 0.0")).unwrap_or_default();
         assert!(!told.contains("does not depend"), "{told}");

@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use starlings_coordinator::study::store::Purpose;
-use starlings_coordinator::study::{RunFolder, Study};
+use starlings_coordinator::study::{RunFolder, Study, StudyError};
 
 fn recording() -> String {
     let mut text = "time,pressure,flow\n".to_owned();
@@ -18,11 +18,19 @@ fn recording() -> String {
 }
 
 fn load(study: &str) -> Study {
+    read(study).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn refused(study: &str) -> String {
+    read(study).map(|study| study.name).unwrap_err().to_string()
+}
+
+fn read(study: &str) -> Result<Study, StudyError> {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("data.csv"), recording()).unwrap();
     let file = folder.path().join("study.toml");
     std::fs::write(&file, study).unwrap();
-    Study::load(&file).unwrap_or_else(|error| panic!("{error}"))
+    Study::load(&file)
 }
 
 /// A Windkessel with these labels of R, C, initial pressure, channel, and time; an empty label is left out.
@@ -204,16 +212,16 @@ fn an_equation_holds_in_the_units_that_it_is_written_in() {
 
 #[test]
 fn an_output_that_corrects_a_state_in_another_unit_is_one_warning() {
-    let study = |kind: &str, layout: &str, [output, state]: [&str; 2]| {
-        load(&format!(
+    let text = |kind: &str, layout: &str, [output, state]: [&str; 2]| {
+        format!(
             "[study]\nname = \"a\"\n[model]\nkind = \"{kind}\"\n{layout}\n\
              [[parameters]]\nname = \"p0\"\nprior = {{ transform = \"log\", median = 1e5, factor = 2 }}\n\
              [observer]\nkind = \"nudging\"\ngain = 1.0\ncorrects = {{ {output} = \"{state}\" }}\n\
              [[records]]\nname = \"r\"\nfile = \"data.csv\"\ninputs = {{ flow = \"flow\" }}\n\
              channels = [ {{ column = \"pressure\", output = \"{output}[0]\", noise = 1 }} ]\n"
-        ))
-        .warnings
+        )
     };
+    let study = |kind: &str, layout: &str, pair| load(&text(kind, layout, pair)).warnings;
     let segment = "layout = { segments = [ { name = \"a\", from = \"i\", to = \"o\", length = 5, radius = 1, thickness = 0.1, \
                    cells = 5 } ], nodes = [ { name = \"i\", kind = \"inlet\" }, { name = \"o\", kind = \"rcr\" } ] }";
     assert_eq!(
@@ -225,6 +233,9 @@ fn an_output_that_corrects_a_state_in_another_unit_is_one_warning() {
     );
     assert_eq!(study("artery-1d", segment, ["flow_rate", "Q"]), [""; 0]);
     assert_eq!(study("fsi-tube", "", ["displacement", "eta"]), [""; 0]);
+    // Nothing of a velocity shows in a displacement at the same time: that is more than another unit.
+    let told = refused(&text("fsi-tube", "", ["displacement", "w"]));
+    assert!(told.contains("does not depend on the state `w"), "{told}");
 }
 
 #[test]

@@ -22,11 +22,9 @@ pub enum Drift {
     Walk(f64),
 }
 
-/// Checks the range of every drift; an empty list means that no parameter drifts.
+/// Checks the number of drifts, p, and the range of each.
 pub(crate) fn check(drift: &[Drift], p: usize) -> Result<(), EstimatorError> {
-    if !drift.is_empty() {
-        crate::data::same("drifts", p, drift.len())?;
-    }
+    crate::data::same("drifts", p, drift.len())?;
     let wrong = drift.iter().enumerate().find_map(|(parameter, d)| match *d {
         Drift::Forgetting(value) if !(value > 0.0 && value <= 1.0) => Some((parameter, value)),
         Drift::Walk(value) if !(value >= 0.0 && value.is_finite()) => Some((parameter, value)),

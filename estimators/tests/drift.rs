@@ -30,7 +30,9 @@ fn pair(points: Points, drift: [Drift; 3], values: &[f64]) -> Pair {
     let (after, still) = roukf.analysis(&particles, &z, &data).unwrap();
     let mut moved = still.clone();
     if let Some(drifted) = roukf.drift(&after, &drift, still.n_used > 0).unwrap() {
-        moved.transform *= drifted;
+        moved.transform *= &drifted;
+        let theta = &after.theta * drifted;
+        assert!(difference(&theta, &(&particles.theta * &moved.transform)) < 1e-13, "T holds the drift");
     }
     Pair { roukf, theta: particles.theta, states, still, moved }
 }
@@ -113,7 +115,7 @@ fn a_drift_out_of_range_or_of_the_wrong_number_or_without_spread_is_refused() {
     assert_eq!(wrong(Drift::Forgetting(0.0)), EstimatorError::DriftOutOfRange { parameter: 1, value: 0.0 });
     assert_eq!(wrong(Drift::Forgetting(1.5)), EstimatorError::DriftOutOfRange { parameter: 1, value: 1.5 });
     assert_eq!(wrong(Drift::Walk(-1.0)), EstimatorError::DriftOutOfRange { parameter: 1, value: -1.0 });
-    let short = refuse(vec![Drift::Walk(0.1)], SD);
+    let short = refuse(vec![Drift::None], SD);
     assert_eq!(short, EstimatorError::Shape { what: "drifts", expected: 3, got: 1 });
     let flat = refuse(vec![Drift::Walk(0.1); 3], [1.0, 0.0, 1.0]);
     assert_eq!(flat, EstimatorError::NoSpread { parameter: 1 });

@@ -5,7 +5,7 @@
 
 use starlings_models::catalogue::NATIVE;
 use starlings_models::spectrum::{Decay, LinearisedSetup, ObserverSpectrum, SpectrumError};
-use starlings_models::{BuildSetup, SOLVER};
+use starlings_models::{BuildSetup, ObserverDef, SOLVER, observer};
 
 use super::{Study, posterior};
 
@@ -26,6 +26,18 @@ pub struct Wanted {
     pub decay: Option<Decay>,
     /// How many of the slowest poles are listed; 100 without it.
     pub poles: Option<usize>,
+}
+
+/// The names of observers that a spectrum may be asked for: every kind, and several of a study one by one and by their joined name.
+pub fn observer_names(own: &ObserverDef) -> Vec<String> {
+    let mut names: Vec<String> = observer::kinds().iter().map(|k| k.kind.to_owned()).collect();
+    if !own.beside.is_empty() {
+        names.extend(own.names());
+        names.push(own.name());
+        names.sort();
+        names.dedup();
+    }
+    names
 }
 
 /// What was found.

@@ -4,9 +4,10 @@
 //! [`super::observer`], for the other observers.
 
 use starlings_models::catalogue::NATIVE;
+use starlings_models::equations::Expression;
 use starlings_models::observer::{self, Wiring};
 use starlings_models::spectrum::start;
-use starlings_models::{BuildSetup, ObserverDef, SOLVER, SetupError, Spec};
+use starlings_models::{BuildSetup, ObserverDef, SOLVER, Setup, SetupError, Spec};
 
 use super::observer::{fitted, report, spacing};
 use crate::file::ObserverSection;
@@ -67,6 +68,28 @@ impl Judged {
             |(output, state)| (Spec::component(&spec.outputs, output), Spec::component(&spec.states, state));
         let limit =
             widest.and_then(|(dt, record)| Some((dt, record, observer.stable_up_to(&*model, &theta, dt)?)));
-        Ok(Self { blind: observer.blind(&*model, &theta).map(named), limit })
+        let blind = observer.blind(&*model, &theta).map(named);
+        // What is flat where runs start, as `max(x - 2, 0)` of a small x, depends on it all the same.
+        let blind = blind.filter(|(output, state)| !mentions(&study.setup, output, state));
+        Ok(Self { blind, limit })
     }
+}
+
+/// Whether the equation of an output, or of one that it reads, names a state; of models without equations nothing is known.
+fn mentions(setup: &Setup, output: &str, state: &str) -> bool {
+    let Some(equations) = &setup.model.equations else { return false };
+    let (mut left, mut seen) = (vec![output.to_owned()], Vec::new());
+    while let Some(name) = left.pop() {
+        if name == state {
+            return true;
+        }
+        let value = equations.outputs.iter().find(|known| known.name == name);
+        if let Some(expression) = value.and_then(|known| Expression::parse(&known.value).ok())
+            && !seen.contains(&name)
+        {
+            left.extend(expression.names().into_iter().map(|(name, _)| name));
+            seen.push(name);
+        }
+    }
+    false
 }

@@ -8,15 +8,11 @@ use starlings_models::spectrum::Decay;
 use crate::checked::SpectrumChoice;
 use crate::file::spectrum::{DecaySection, SpectrumSection};
 use crate::problem::Source;
+use crate::spectrum::observer_names;
 
 /// `[spectrum]`.
 pub(super) fn spectrum(source: &Source, section: &SpectrumSection, own: &ObserverDef) -> SpectrumChoice {
-    let mut kinds: Vec<String> =
-        starlings_models::observer::kinds().iter().map(|k| k.kind.to_owned()).collect();
-    // Several observers of the study are one entry, under their joined name.
-    if !own.beside.is_empty() {
-        kinds.push(own.name());
-    }
+    let kinds = observer_names(own);
     for name in section.observers.iter().filter(|name| !kinds.contains(name.get_ref())) {
         source.report_unknown(name.span(), format!("unknown observer `{}`", name.get_ref()), &kinds);
     }

@@ -88,7 +88,7 @@ mod tests {
     #[test]
     fn a_bound_is_never_rounded_up() {
         assert!((rounded_down(0.123_99) - 0.123).abs() < 1e-12);
-        assert!((rounded_down(0.1) - 0.1).abs() < 1e-3 && rounded_down(0.1) <= 0.1);
+        assert!((rounded_down(0.1) - 0.1).abs() < 1e-12 && rounded_down(0.1) <= 0.1);
     }
 
     #[test]

@@ -66,11 +66,15 @@ pub(crate) fn setup_of(study: &Study) -> Setup {
     setup
 }
 
+/// Step of the predictions; none where the solver answers at the times of the records only.
+pub(crate) fn step_of(study: &Study) -> Option<f64> {
+    study.predict.step.filter(|_| !study.whole_answers)
+}
+
 /// A record from its start, without any observed value, at the times of the predictions.
 pub(crate) fn window_of(study: &Study, record: usize) -> Window {
-    let step = study.predict.step.filter(|_| !study.whole_answers);
     let of_record = &study.records[record];
-    let times = times_of(of_record, step);
+    let times = times_of(of_record, step_of(study));
     Window::free(of_record.start, times, study.predict.outputs.len(), of_record.inputs.clone())
 }
 

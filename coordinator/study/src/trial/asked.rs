@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::dry_run::Depth;
 use super::{Fault, Runner, TrialError, named, run};
 use crate::field::observed_fields;
-use crate::predicted::members::window_of;
+use crate::predicted::members::{step_of, window_of};
 use crate::problem::quoted_list;
 use crate::{Study, posterior};
 
@@ -15,7 +15,8 @@ use crate::{Study, posterior};
 pub(super) fn is_more(study: &Study) -> bool {
     let asked = &study.predict;
     !asked.outputs.is_empty()
-        && (asked.step.is_some() || asked.outputs.iter().any(|output| !study.setup.outputs.contains(output)))
+        && (step_of(study).is_some()
+            || asked.outputs.iter().any(|output| !study.setup.outputs.contains(output)))
 }
 
 /// One run of what is predicted, over the first record or over all.
@@ -31,7 +32,7 @@ pub(super) fn predictions(study: &Study, depth: Depth, model: &dyn Runner) -> Re
             let record = record.name.clone();
             match fault {
                 Fault::Run(source) => TrialError::Predict {
-                    outputs: quoted(study),
+                    outputs: quoted_list(&observed_fields(&study.predict.outputs)),
                     record,
                     values: named(study, &theta),
                     source,
@@ -41,9 +42,4 @@ pub(super) fn predictions(study: &Study, depth: Depth, model: &dyn Runner) -> Re
         })?;
     }
     Ok(())
-}
-
-/// What is predicted, in quotes, components of a field as one.
-fn quoted(study: &Study) -> String {
-    quoted_list(&observed_fields(&study.predict.outputs))
 }

@@ -97,11 +97,9 @@ pub(super) fn spacing(inputs: &[Signal]) -> f64 {
 /// Whether an input has changed within a time as a signal must that can be said to return; of inputs that never change nothing is asked.
 pub(super) fn has_left(inputs: &[Signal], start: f64, period: f64) -> bool {
     let varying = || inputs.iter().filter(|signal| range(&signal.values).is_some());
-    let lags = (1..WITHIN).map(|k| period * f64::from(k) / f64::from(WITHIN));
+    let mut lags = (1..WITHIN).map(|k| period * f64::from(k) / f64::from(WITHIN));
     varying().next().is_none()
-        || lags
-            .clone()
-            .any(|lag| varying().filter_map(|s| input_mismatch(s, start, lag)).any(|share| share > AWAY))
+        || lags.any(|lag| varying().filter_map(|s| input_mismatch(s, start, lag)).any(|share| share > AWAY))
 }
 
 /// The lowest place of a function between two ends (golden section; Kiefer 1953).

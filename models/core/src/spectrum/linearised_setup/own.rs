@@ -28,9 +28,8 @@ impl LinearisedSetup {
         if !self.observer.beside.is_empty() && self.observer.name() == kind {
             return self.observer.at(gain);
         }
-        let own = self.observer.all().zip(self.observer.names());
-        let own = own.filter(|(_, name)| name == kind).map(|(def, _)| def).next();
-        if let Some(def) = own {
+        let mut own = self.observer.all().zip(self.observer.names());
+        if let Some((def, _)) = own.find(|(_, name)| name == kind) {
             return ObserverDef { gain, ..def.alone() };
         }
         let own = self.observer.all().find(|def| def.kind == kind);
@@ -75,8 +74,8 @@ impl LinearisedSetup {
         self.observer.all().map(of_one).collect()
     }
 
-    /// The largest share of the gains of the setup's own observers, below one, up to which no error grows under all of them together;
-    /// `None` where none grows at the whole gains, 0 where errors grow without any observer.
+    /// The largest share of the gains of the setup's own observers, below one, with which no error grows under all of them together;
+    /// `None` where none grows at the whole gains, 0 where one grows at every share down to a millionth.
     ///
     /// # Errors
     /// When the model cannot host one of them, or the poles are not found.
@@ -86,23 +85,23 @@ impl LinearisedSetup {
         let is_stable = |share: f64| {
             Ok::<_, SpectrumError>(system.max_re(share * self.observer.gain)? <= GROWTH * largest)
         };
-        if is_stable(1.0)? {
-            return Ok(None);
-        }
-        // From small shares up, thirty to the decade; the first that grows bounds the last that does not.
-        let shares = (0..=SHARES).map(|k| 10_f64.powf(f64::from(k - SHARES) / PER_DECADE));
-        let (mut stable, mut unstable) = (0.0, 1.0);
-        for share in shares {
-            if !is_stable(share)? {
-                unstable = share;
-                break;
+        // From the whole gains down: the first that is stable lies below one that is not.
+        let mut unstable = 1.0;
+        for k in 0..=SHARES {
+            let mut stable = 10_f64.powf(-f64::from(k) / PER_DECADE);
+            if !is_stable(stable)? {
+                unstable = stable;
+                continue;
             }
-            stable = share;
+            if k == 0 {
+                return Ok(None);
+            }
+            while unstable / stable > 1.0 + 1e-9 {
+                let middle = f64::midpoint(stable, unstable);
+                if is_stable(middle)? { stable = middle } else { unstable = middle }
+            }
+            return Ok(Some(stable));
         }
-        while stable > 0.0 && unstable / stable > 1.0 + 1e-9 {
-            let middle = f64::midpoint(stable, unstable);
-            if is_stable(middle)? { stable = middle } else { unstable = middle }
-        }
-        Ok(Some(stable))
+        Ok(Some(0.0))
     }
 }
