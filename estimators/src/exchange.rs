@@ -88,7 +88,7 @@ pub fn exchange_prior(
     })
 }
 
-fn root(g: &Gaussian, what: &'static str) -> Result<Cholesky<f64, Dyn>, EstimatorError> {
+pub(crate) fn root(g: &Gaussian, what: &'static str) -> Result<Cholesky<f64, Dyn>, EstimatorError> {
     g.covariance.clone().cholesky().ok_or(EstimatorError::NotPositiveDefinite { what })
 }
 
@@ -102,9 +102,13 @@ pub(crate) struct Likelihood {
 
 /// The posterior under one prior, and the two parts of its log evidence, fit − log_det / 2.
 pub(crate) struct Update {
+    /// Length p.
     pub(crate) mean: DVector<f64>,
+    /// F, p x p, whose F F^T is the covariance.
     pub(crate) factor: DMatrix<f64>,
+    /// Of the exponent at the mean.
     pub(crate) fit: f64,
+    /// Of prior over posterior covariance.
     pub(crate) log_det: f64,
 }
 

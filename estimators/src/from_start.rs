@@ -10,7 +10,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::data::same;
-use crate::exchange::Likelihood;
+use crate::exchange::{Likelihood, Update, root};
 use crate::{Analysis, EstimatorError, Exchanged, Filter, Gaussian, Particles, spectral};
 
 /// A pass with drift seen from its start; e is counted in the directions of the particles there.
@@ -115,20 +115,19 @@ impl FromStart {
     }
 
     /// What is known of e. A wanted prior that is narrower than the used one in a direction leaves e there where it is.
-    fn start(&self, used: &Gaussian, wanted: &Gaussian) -> Result<crate::exchange::Update, EstimatorError> {
+    fn start(&self, used: &Gaussian, wanted: &Gaussian) -> Result<Update, EstimatorError> {
         for (what, g) in [("used prior", used), ("wanted prior", wanted)] {
             same(what, self.known.n_param(), g.n_param())?;
         }
-        let singular = EstimatorError::NotPositiveDefinite { what: "used prior" };
-        let l = used.covariance.clone().cholesky().ok_or_else(|| singular.clone())?.unpack();
-        let solve = |x: &DMatrix<f64>| l.solve_lower_triangular(x).ok_or_else(|| singular.clone());
-        let away = &wanted.mean - &used.mean;
-        let away = solve(&DMatrix::from_column_slice(away.len(), 1, away.as_slice()))?;
+        let l = root(used, "used prior")?.unpack();
+        let singular = || EstimatorError::NotPositiveDefinite { what: "used prior" };
+        let solve = |x: &DMatrix<f64>| l.solve_lower_triangular(x).ok_or_else(singular);
+        let away = l.solve_lower_triangular(&(&wanted.mean - &used.mean)).ok_or_else(singular)?;
         let wider = solve(&solve(&(&wanted.covariance - &used.covariance))?.transpose())?;
         let eigen = spectral::eigen((&wider + wider.transpose()) * 0.5, "difference of the priors")?;
-        let root =
+        let wider =
             &eigen.eigenvectors * DMatrix::from_diagonal(&eigen.eigenvalues.map(|v| v.max(0.0).sqrt()));
         let likelihood = Likelihood { information: self.information.clone(), slope: self.score.clone() };
-        likelihood.update(&away.column(0).clone_owned(), &root)
+        likelihood.update(&away, &wider)
     }
 }

@@ -60,7 +60,7 @@ impl Filter for Roukf {
 
     fn gaussian(&self, p: &Particles) -> Gaussian {
         let geometry = Geometry::new(&self.set, &p.pull);
-        let l = self.directions(p, &p.theta);
+        let l = &p.theta * &geometry.slope;
         Gaussian { mean: &p.theta * &geometry.mean, covariance: &l * l.transpose() }
     }
 
@@ -161,9 +161,9 @@ impl Filter for Roukf {
 
     fn reduced(&self, p: &Particles, t: &DMatrix<f64>) -> (DVector<f64>, DMatrix<f64>) {
         let points = Geometry::new(&self.set, &p.pull).points * t;
-        let whole = vec![1.0; p.pull.len()];
-        let after = Particles { theta: p.theta.clone(), pull: whole };
-        (&points * &self.set.weights, self.directions(&after, &points))
+        // Afterwards no particle is pulled any more.
+        let whole = Geometry::new(&self.set, &vec![1.0; p.pull.len()]);
+        (&points * whole.mean, &points * whole.slope)
     }
 }
 

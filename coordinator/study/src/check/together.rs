@@ -8,11 +8,8 @@ use starlings_models::{BuildSetup, SOLVER};
 
 use super::load::Purpose;
 use crate::file::ObserverSection;
-use crate::problem::Source;
+use crate::problem::{Source, quoted_list};
 use crate::{Study, posterior};
-
-/// Growth of the slowest error, in parts of the largest gain, that is rounding.
-const ROUNDING: f64 = 1e-9;
 
 /// Reports observers that correct the same state, or are unstable together though each is stable.
 pub(super) fn check(source: &Source, section: &ObserverSection, study: &Study, purpose: Purpose) {
@@ -25,7 +22,7 @@ pub(super) fn check(source: &Source, section: &ObserverSection, study: &Study, p
     if let Ok(Some((first, second, state))) = linearised.shared_state() {
         let outputs = linearised.outputs_read().unwrap_or_default();
         let told = |at: usize| {
-            let of = outputs.get(at).map_or_else(String::new, |of| format!(" by `{}`", of.join("`, `")));
+            let of = outputs.get(at).map_or_else(String::new, |of| format!(" by {}", quoted_list(of)));
             format!("`{}`{of}", sections[at].kind.get_ref())
         };
         source.report_with(
@@ -39,8 +36,7 @@ pub(super) fn check(source: &Source, section: &ObserverSection, study: &Study, p
         return;
     }
     let Ok((together, alone)) = linearised.together_and_alone() else { return };
-    let largest = sections.iter().map(|one| *one.gain.get_ref()).fold(0.0, f64::max);
-    if disagree(together, &alone, ROUNDING * largest) {
+    if disagree(together, &alone, linearised.rounding()) {
         let (name, unit) = (study.setup.observer.name(), &study.time_unit);
         source.report_with(
             section.kind.span(),

@@ -104,16 +104,19 @@ pub(super) fn read(text: &str) -> Result<File, String> {
     serde_saphyr::from_str(text).map_err(|error| {
         let message = error.without_snippet().to_string();
         let said =
-            error.location().map(|at| said(text, (at.line() as usize, at.column() as usize), &message));
+            error.location().map(|at| with_place(text, (at.line() as usize, at.column() as usize), &message));
         old(text).or(said).unwrap_or(message)
     })
 }
 
 /// What is wrong at a place, with the place once and with what stands there.
-fn said(text: &str, (line, column): (usize, usize), message: &str) -> String {
+fn with_place(text: &str, (line, column): (usize, usize), message: &str) -> String {
     let message = message.trim_end_matches(&format!(" at line {line}, column {column}"));
     let indent = |line: &str| line.chars().take_while(|c| c.is_whitespace()).any(|c| c == '\t');
-    if let Some(at) = text.lines().position(indent).filter(|_| message.contains("tab")) {
+    let speaks_of_tabs =
+        message.split(|c: char| !c.is_alphabetic()).any(|word| ["tab", "tabs"].contains(&word));
+    let is_here = |at: &usize| (at + 1).abs_diff(line) <= 1;
+    if let Some(at) = text.lines().position(indent).filter(is_here).filter(|_| speaks_of_tabs) {
         return format!(
             "line {}: a tab stands before `{}`: YAML takes blanks alone there",
             at + 1,

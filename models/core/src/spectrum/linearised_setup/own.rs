@@ -10,7 +10,7 @@ use crate::spectrum::observed::{Feedback, ObservedSystem};
 use crate::{ObserverDef, SetupError, Spec};
 
 /// Growth of the slowest error, in parts of the largest gain, that is rounding.
-const GROWTH: f64 = 1e-9;
+const ROUNDING: f64 = 1e-9;
 /// Shares of the gains that are looked at for a stable one, and how many of them there are to the decade.
 const SHARES: i32 = 180;
 const PER_DECADE: f64 = 30.0;
@@ -36,6 +36,11 @@ impl LinearisedSetup {
         let own = own.or_else(|| (kind == "nudging").then_some(&self.observer));
         let corrects = own.map_or_else(BTreeMap::default, |def| def.corrects.clone());
         ObserverDef { kind: kind.to_owned(), gain, corrects, ..ObserverDef::default() }
+    }
+
+    /// Growth of the slowest error, in 1/time, up to which it counts as none.
+    pub fn rounding(&self) -> f64 {
+        ROUNDING * self.observer.all().map(|def| def.gain).fold(0.0, f64::max)
     }
 
     /// The largest real part of the poles under the setup's own observers, and under each of them alone at its gain, in 1/time.
@@ -81,10 +86,9 @@ impl LinearisedSetup {
     /// When the model cannot host one of them, or the poles are not found.
     pub fn stable_share(&self) -> Result<Option<f64>, SpectrumError> {
         let system = self.observed(&self.observer.name())?;
-        let largest = self.observer.all().map(|def| def.gain).fold(0.0, f64::max);
-        let is_stable = |share: f64| {
-            Ok::<_, SpectrumError>(system.max_re(share * self.observer.gain)? <= GROWTH * largest)
-        };
+        let rounding = self.rounding();
+        let is_stable =
+            |share: f64| Ok::<_, SpectrumError>(system.max_re(share * self.observer.gain)? <= rounding);
         // From the whole gains down: the first that is stable lies below one that is not.
         let mut unstable = 1.0;
         for k in 0..=SHARES {
