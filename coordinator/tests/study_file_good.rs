@@ -8,7 +8,7 @@ use std::sync::Arc;
 use starlings_coordinator::study::Study;
 use starlings_estimators::{Drift, Points, Transform};
 use starlings_models::units::rounded;
-use starlings_models::{BuildSetup, Job, Quantity, Role, Window};
+use starlings_models::{BuildSetup, Job, Window};
 
 /// Values above this stand only where nothing may be fitted.
 const SECRET: f64 = 1e6;
@@ -244,60 +244,4 @@ prior = { transform = "log", median = 0.1, factor = 2.0 }
     let most = noise.iter().copied().fold(0.0, f64::max);
     let range = format!("in 5 records was not given: {} m to {} m were found", four(least), four(most));
     assert!(told[0].contains(&range), "as they are pooled, {noise:?}: {told:?}");
-}
-
-/// A ball that falls.
-const BALL: &str = r#"
-[study]
-name = "ball"
-seed = 1
-[model]
-kind = "equations"
-inputs = [{ name = "push", unit = "N" }, { name = "room", unit = "degC", role = "other" }]
-outputs = [{ name = "seen", value = "x" }]
-[[model.states]]
-name = "x"
-unit = "m"
-rate = "v"
-[[model.states]]
-name = "v"
-unit = "m/s"
-rate = "g + push + 0*room"
-[[parameters]]
-name = "g"
-prior = { transform = "log", median = 9.8, factor = 1.1 }
-[[records]]
-name = "fall"
-file = "fall.csv"
-inputs = { push = "zero", room = "zero" }
-channels = [{ column = "x", output = "seen", noise = 0.01 }]
-"#;
-
-fn ball(study: &str) -> Study {
-    let mut text = "time,x,zero\n".to_owned();
-    for k in 0..20 {
-        writeln!(text, "{k},{},0", k * k).unwrap();
-    }
-    load(study, &[("fall.csv", text)])
-}
-
-#[test]
-fn a_training_span_that_ends_far_behind_its_record_is_told() {
-    let told = |train: &str| {
-        let study = ball(&BALL.replace("inputs = { push", &format!("train = {train}\ninputs = {{ push")));
-        study.warnings.iter().any(|w| w.contains("`train` of record `fall` ends at"))
-    };
-    assert!(told("[0, 700]"), "milliseconds");
-    assert!(!told("[0, 15]") && !told("[0, 20]"), "a sample behind the end");
-    assert!(!told("[0, inf]"), "without an end");
-}
-
-#[test]
-fn what_a_quantity_is_stands_in_its_unit_where_the_study_does_not_say_it() {
-    let study = ball(BALL);
-    let spec = study.setup.spec().unwrap();
-    let roles = |list: &[Quantity]| list.iter().map(|q| q.role).collect::<Vec<Role>>();
-    assert_eq!(roles(&spec.states), [Role::Displacement, Role::Velocity]);
-    assert_eq!(roles(&spec.outputs), [Role::Displacement], "an output that is a state means what that means");
-    assert_eq!(roles(&spec.inputs), [Role::Force, Role::Other]);
 }
