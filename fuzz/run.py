@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
 """Runs every fuzz target until it has had its processor time, and tells what came of it: the table of docs/fuzzing.md.
 
-    fuzz/run.py [--seconds N] [--write] [TARGET ...]     600 s each; --write writes the page
+    fuzz/run.py [--seconds N] [--at-once N] [--write] [TARGET ...]     600 s each; --write writes the page
 """
 import argparse
 import os
 import re
-import resource
 import subprocess
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 FOLDER = Path(__file__).parent
@@ -23,11 +23,6 @@ def cargo_fuzz(*arguments, **options):
     return subprocess.run(["cargo", "fuzz", *arguments], cwd=FOLDER, env=ENVIRONMENT, text=True, **options)
 
 
-def processor_time():
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
-
-
 class Target:
     def __init__(self, name):
         self.name, self.seconds, self.executions, self.findings = name, 0.0, 0, []
@@ -37,19 +32,21 @@ class Target:
 
     def turn(self, left):
         """Fuzzes for a while; a finding ends the target."""
-        before = processor_time()
         corpus, artifacts = FOLDER / "corpus" / self.name, FOLDER / "artifacts" / self.name
         corpus.mkdir(parents=True, exist_ok=True)
         artifacts.mkdir(parents=True, exist_ok=True)
         limits = [f"-max_total_time={max(1, min(TURN, int(left)))}", "-rss_limit_mb=2048", "-print_final_stats=1"]
         call = [self.program, *limits, f"-artifact_prefix={artifacts}/", corpus]
         # The program itself and not cargo, whose time is not the target's.
-        done = subprocess.run(call, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, errors="replace")
-        self.seconds += processor_time() - before
-        self.executions += sum(map(int, re.findall(r"stat::number_of_executed_units:\s*(\d+)", done.stderr)))
-        if done.returncode != 0:
-            self.findings.append(done.stderr[-4000:])
-            print(f"{self.name}: found something\n{done.stderr[-4000:]}", flush=True)
+        running = subprocess.Popen(call, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, errors="replace")
+        said = running.stderr.read()
+        _, status, used = os.wait4(running.pid, 0)
+        running.returncode = os.waitstatus_to_exitcode(status)
+        self.seconds += used.ru_utime + used.ru_stime
+        self.executions += sum(map(int, re.findall(r"stat::number_of_executed_units:\s*(\d+)", said)))
+        if running.returncode != 0:
+            self.findings.append(said[-4000:])
+            print(f"{self.name}: found something\n{said[-4000:]}", flush=True)
 
 
 def table(targets):
@@ -67,6 +64,7 @@ def write(targets):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seconds", type=float, default=float(os.environ.get("FUZZ_SECONDS", "600")))
+    parser.add_argument("--at-once", type=int, default=os.cpu_count(), help="targets at a time")
     parser.add_argument("--write", action="store_true", help="write the table into docs/fuzzing.md, after every round")
     parser.add_argument("targets", nargs="*")
     given = parser.parse_args()
@@ -75,8 +73,8 @@ def main():
     names = given.targets or cargo_fuzz("list", stdout=subprocess.PIPE, check=True).stdout.split()
     targets = [Target(name) for name in names]
     while due := [t for t in targets if t.seconds < given.seconds and not t.findings]:
-        for target in due:
-            target.turn(given.seconds - target.seconds)
+        with ThreadPoolExecutor(given.at_once) as pool:
+            list(pool.map(lambda target: target.turn(given.seconds - target.seconds), due))
         print(table(targets), flush=True)
         if given.write:
             write(targets)
