@@ -217,6 +217,7 @@ fn solver() -> Result<(), Box<dyn std::error::Error>> {
         terms: &[],
         constants: &[("c".to_owned(), 1.0)],
         stop: None,
+        traceparent: Some("00-0af7651916cd43dd8448eb211c80319c-b7ad6b7169203331-01"),
     };
     write("solver_request", "run", &encode_run(&run, "/tmp/scratch").encode_to_vec())?;
     let solved = Solved { outputs: vec![0.1, 0.2], state: vec![0.0, 0.0] };
