@@ -69,7 +69,7 @@ def main():
     parser.add_argument("targets", nargs="*")
     given = parser.parse_args()
     cargo_fuzz("build", "-s", "none").check_returncode()
-    subprocess.run(["cargo", "run", "--quiet", "--manifest-path", "fuzz/Cargo.toml", "--example", "seeds"], cwd=FOLDER.parent, check=True)
+    subprocess.run(["cargo", "run", "--quiet", "--release", "--example", "fuzz-seeds"], cwd=FOLDER.parent, check=True)
     names = given.targets or cargo_fuzz("list", stdout=subprocess.PIPE, check=True).stdout.split()
     targets = [Target(name) for name in names]
     while due := [t for t in targets if t.seconds < given.seconds and not t.findings]:

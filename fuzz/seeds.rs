@@ -27,7 +27,7 @@ const LEASE: Lease = Lease { epoch: 1, job: 7, attempt: 1 };
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     messages()?;
     texts()?;
-    let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples");
+    let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
     for (target, ending) in [("study", "toml"), ("recording", "csv"), ("mesh", "off"), ("template", "tmpl")] {
         for (i, file) in
             files(&examples)?.iter().filter(|file| file.extension().is_some_and(|e| e == ending)).enumerate()
@@ -37,7 +37,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             write(target, &format!("example-{i}"), &content[..content.len().min(20_000)])?;
         }
     }
-    let imported = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/import_files");
+    let imported = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/import_files");
     for (target, ending) in [("svzerodsolver", "json"), ("openbf", "yaml")] {
         for (i, file) in files(&imported.join(target))?.iter().enumerate() {
             if file.extension().is_some_and(|e| e == ending) {
@@ -60,12 +60,21 @@ fn files(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
 }
 
 fn write(target: &str, name: &str, bytes: &[u8]) -> std::io::Result<()> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus").join(target);
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus").join(target);
     std::fs::create_dir_all(&folder)?;
     std::fs::write(folder.join(name), bytes)
 }
 
+/// One message of each kind that travels.
 fn messages() -> Result<(), Box<dyn std::error::Error>> {
+    from_worker()?;
+    to_worker()?;
+    transfers()?;
+    solver()
+}
+
+/// What a worker says, and how its runs ended.
+fn from_worker() -> Result<(), Box<dyn std::error::Error>> {
     let hello = Hello {
         protocol: PROTOCOL,
         version: VERSION.to_owned(),
@@ -111,21 +120,17 @@ fn messages() -> Result<(), Box<dyn std::error::Error>> {
     for (i, message) in from_worker.into_iter().enumerate() {
         write("from_worker", &format!("kind-{i}"), &message.encode()?.encode_to_vec())?;
     }
-    to_worker()?;
-    solver()?;
+    Ok(())
+}
 
-    write(
-        "state_transfer",
-        "get",
-        &Get { epoch: 1, nonce: 42, state: [7; 32], names: true, descriptor: 3 }.encode().encode_to_vec(),
-    )?;
+/// The way of a large state.
+fn transfers() -> Result<(), Box<dyn std::error::Error>> {
+    let get = Get { epoch: 1, nonce: 42, state: [7; 32], names: true, descriptor: 3 };
+    write("state_transfer", "get", &get.encode().encode_to_vec())?;
     write("state_transfer", "answer", &encode_put_result(&[7; 32]).encode_to_vec())?;
-    write(
-        "state_transfer",
-        "head",
-        &PutHead { n_state: 3, lease: LEASE, nonce: 42 }.encode().encode_to_vec(),
-    )?;
-    let lend = Lend { head: PutHead { n_state: 3, lease: LEASE, nonce: 42 }, descriptor: 5 };
+    let head = PutHead { n_state: 3, lease: LEASE, nonce: 42 };
+    write("state_transfer", "head", &head.encode().encode_to_vec())?;
+    let lend = Lend { head, descriptor: 5 };
     write("state_transfer", "lend", &lend.encode().encode_to_vec())?;
     let back = GiveBack { epoch: 1, nonce: 42, descriptor: 5 };
     write("state_transfer", "give-back", &back.encode().encode_to_vec())?;
@@ -187,6 +192,7 @@ fn to_worker() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
+/// What goes between a worker and a solver.
 fn solver() -> Result<(), Box<dyn std::error::Error>> {
     let spec = Spec {
         states: vec![Quantity::new("x", "m").size(2)],
@@ -204,7 +210,8 @@ fn solver() -> Result<(), Box<dyn std::error::Error>> {
     };
     write("solver_description", "beam", &encode_description(&description).encode_to_vec())?;
     write("description_file", "beam", &serde_json::to_vec(&description)?)?;
-    let window = Window { start: 0.0, times: vec![1.0, 2.0], observed: vec![0.1, 0.2], inputs: vec![], since: vec![] };
+    let window =
+        Window { start: 0.0, times: vec![1.0, 2.0], observed: vec![0.1, 0.2], inputs: vec![], since: vec![] };
     let run = Run {
         particle: 1,
         record: 0,
@@ -230,6 +237,7 @@ fn solver() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
+/// Files and texts that no example holds.
 fn texts() -> Result<(), Box<dyn std::error::Error>> {
     let access = AccessFile::new("pig", vec!["node7:7000".to_owned()], "-----BEGIN", Token::of(&[1; 32]));
     write("access_file", "whole", &serde_json::to_vec(&access)?)?;

@@ -1,7 +1,7 @@
 //! `starlings models`: the catalogue, written by the models themselves.
 
 use clap::Parser;
-use starlings_models::{ModelDef, Quantity, Spec, catalogue, nearest};
+use starlings_models::{ModelDef, Quantity, Spec, catalogue, meant, nearest};
 
 use crate::console::{line, table, text};
 use crate::failure::Failure;
@@ -23,7 +23,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         let names: Vec<String> = specs.iter().map(|s| s.kind.clone()).collect();
         specs.retain(|s| s.kind == *kind);
         if specs.is_empty() {
-            let hint = nearest(kind, &names).map(|n| format!("; did you mean `{n}`?")).unwrap_or_default();
+            let hint = meant(nearest(kind, &names));
             return Err(Failure::input(format!(
                 "no model named `{kind}`{hint} (known: {})",
                 names.join(", ")

@@ -9,7 +9,7 @@ use starlings_coordinator::study::field::{component_of, components, quantity_of}
 use starlings_coordinator::study::twin::{Recording, Twin, simulate};
 use starlings_models::effect::library::library_in;
 use starlings_models::effect::{EffectDef, library};
-use starlings_models::{Spec, catalogue, nearest};
+use starlings_models::{Spec, catalogue, meant, nearest};
 
 use crate::console::note;
 use crate::csv_file::{self, StudyLocation};
@@ -171,7 +171,7 @@ fn check_names(args: &Args, study: &Study) -> Result<(), Failure> {
     names.retain(|name| seen.insert(name.clone()));
     for (name, _) in &args.set {
         if !names.contains(name) {
-            let hint = nearest(name, &names).map(|n| format!("; did you mean `{n}`?")).unwrap_or_default();
+            let hint = meant(nearest(name, &names));
             let names = listed(&names).join(", ");
             return Err(Failure::input(format!(
                 "--set {name}: the study has no parameter, constant or initial value of that name{hint} (it has: {names})"

@@ -10,8 +10,8 @@ use clap::Parser;
 use starlings_coordinator::report::locus::{Locus, render};
 use starlings_coordinator::study::Study;
 use starlings_coordinator::study::spectrum::{ExamineError, Spectrum, Wanted, examine, observer_names};
-use starlings_models::nearest;
 use starlings_models::spectrum::Decay;
+use starlings_models::{meant, nearest};
 
 use crate::console::line;
 use crate::csv_file::{self, StudyLocation};
@@ -97,7 +97,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
 fn check(args: &Args, known: &[String]) -> Result<(), Failure> {
     let known: Vec<&str> = known.iter().map(String::as_str).collect();
     if let Some(name) = args.observers.iter().find(|name| !known.contains(&name.as_str())) {
-        let hint = nearest(name, &known).map(|n| format!("; did you mean `{n}`?")).unwrap_or_default();
+        let hint = meant(nearest(name, &known));
         let known = known.join(", ");
         return Err(Failure::input(format!(
             "--observers: no observer named `{name}`{hint} (known: {known})"

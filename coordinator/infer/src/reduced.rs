@@ -6,7 +6,7 @@ use nalgebra::DVector;
 use starlings_estimators::inference::{InferenceError, Posterior, Structure, reduce};
 use starlings_estimators::quantiles::normal;
 use starlings_models::equations::{At, Expression, Program, Slot};
-use starlings_models::{Drive, nearest};
+use starlings_models::{Drive, did_you_mean, nearest};
 use starlings_study::infer_choice::ReducedChoice;
 
 use crate::error::InferError;
@@ -96,10 +96,8 @@ impl Reduced {
         let mut coefficients: Vec<Option<Program>> = names.iter().map(|_| None).collect();
         for (name, text) in &choice.coefficients {
             let Some(at) = names.iter().position(|known| known == name) else {
-                let near = nearest(name, &names).map_or_else(
-                    || format!("there are {}", names.join(", ")),
-                    |n| format!("did you mean `{n}`?"),
-                );
+                let near = nearest(name, &names)
+                    .map_or_else(|| format!("there are {}", names.join(", ")), did_you_mean);
                 return Err(InferError::Reduced(format!("there is no coefficient `{name}` ({near})")));
             };
             coefficients[at] = Some(compile(text)?);

@@ -5,7 +5,7 @@
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use starlings_models::nearest;
+use starlings_models::{did_you_mean, nearest};
 
 use crate::error::InferError;
 
@@ -60,7 +60,7 @@ impl<R: Read> Rows<R> {
                              with commas"
                         )
                     }
-                    Some(near) => format!("did you mean `{near}`?"),
+                    Some(near) => did_you_mean(near),
                     None => format!("the columns are {}", headers.join(", ")),
                 };
                 told(Some(1), message(), &help)

@@ -3,6 +3,7 @@
 //! The binary renders problems with source excerpts; here a problem is data with a one-line display. Next file to read:
 //! [`super::file`].
 
+use starlings_models::{did_you_mean, nearest, quoted_list};
 use std::cell::RefCell;
 use std::fmt;
 use std::ops::Range;
@@ -117,17 +118,12 @@ impl Source {
 
 /// `did you mean ...?` for a near miss, otherwise the list of what is valid.
 pub(super) fn suggestion(name: &str, valid: &[String]) -> Option<String> {
-    if let Some(near) = starlings_models::nearest(name, valid) {
-        return Some(format!("did you mean `{near}`?"));
+    if let Some(near) = nearest(name, valid) {
+        return Some(did_you_mean(near));
     }
     match valid {
         [] => None,
         [only] => Some(format!("the only valid name is `{only}`")),
         all => Some(format!("valid names: {}", quoted_list(all))),
     }
-}
-
-/// Names in backticks, separated by commas.
-pub(super) fn quoted_list<S: AsRef<str>>(names: &[S]) -> String {
-    names.iter().map(|n| format!("`{}`", n.as_ref())).collect::<Vec<_>>().join(", ")
 }

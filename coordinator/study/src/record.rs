@@ -26,13 +26,13 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
-use starlings_models::Spec;
+use starlings_models::{Spec, did_you_mean, nearest};
 use toml::Spanned;
 
 use super::checked::Record;
 use super::field::field_of;
 use super::file::RecordSection;
-use super::problem::{Source, suggestion};
+use super::problem::Source;
 pub(super) use crate::record::csv::Csv;
 use crate::record::found_noise::FoundNoise;
 use crate::record::input::inputs;
@@ -131,10 +131,8 @@ impl<'a> Recordings<'a> {
             .filter(|n| Path::new(n).extension().is_some_and(|e| e.eq_ignore_ascii_case("csv")))
             .collect();
         present.sort();
-        match suggestion(name, &present) {
-            Some(help) if help.starts_with("did you mean") => help,
-            _ => "paths are relative to the study file".to_owned(),
-        }
+        let relative = || "paths are relative to the study file".to_owned();
+        nearest(name, &present).map_or_else(relative, did_you_mean)
     }
 
     /// Reads and checks one record. `outputs` are the study's outputs so far, extended by this record's.

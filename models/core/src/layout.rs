@@ -7,8 +7,8 @@
 use serde::de::DeserializeOwned;
 
 use crate::SetupError;
-use crate::nearest;
 use crate::setup::ModelDef;
+use crate::{meant, nearest};
 
 /// The layout of a definition as a model's own type; the type's default where the definition has none.
 ///
@@ -32,8 +32,7 @@ fn in_words(message: &str) -> String {
             "f32" | "f64" => "a number",
             "struct" => "a table",
             _ => {
-                let near = nearest_key(said, expected).map(|key| format!("; did you mean `{key}`?"));
-                return message.to_owned() + &near.unwrap_or_default();
+                return message.to_owned() + &meant(nearest_key(said, expected));
             }
         };
         return format!("{said}, expected {plain}");

@@ -6,7 +6,7 @@
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SetupError {
     /// A name that no model, quantity, observer or effect has.
-    #[error("no {what} named `{name}`{}", nearest.as_ref().map(|n| format!("; did you mean `{n}`?")).unwrap_or_default())]
+    #[error("no {what} named `{name}`{}", crate::meant(nearest.as_ref()))]
     Unknown {
         /// What was looked for, such as `model`, `parameter` or `rate term`.
         what: &'static str,

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Quantity, Spec, nearest};
+use crate::{Quantity, Spec, meant, nearest};
 
 /// The `kind` of a model that runs in a program of its own.
 pub const SOLVER: &str = "solver";
@@ -142,14 +142,14 @@ impl Description {
         if let Some(host) = self.hosts.iter().find(|host| !scalar.contains(&host.as_str())) {
             let what =
                 format!("it names the state `{host}` as a host of terms, which is none of its scalar states");
-            return Some(what + &meant(host, &scalar));
+            return Some(what + &meant(nearest(host, &scalar)));
         }
         for (output, state) in &spec.measures {
             for (what, name, list) in [("output", output, &spec.outputs), ("state", state, &spec.states)] {
                 if Spec::range_of(list, name).is_none() {
                     let known: Vec<&str> = list.iter().map(|q| q.name.as_str()).collect();
                     let fault = format!("it names the {what} `{name}`, which is not among its {what}s");
-                    return Some(fault + &meant(name, &known));
+                    return Some(fault + &meant(nearest(name, &known)));
                 }
             }
         }
@@ -179,8 +179,4 @@ fn fault_of_list(what: &str, list: &[Quantity]) -> Option<String> {
         let [lo, hi] = q.range;
         (lo.is_nan() || hi.is_nan() || lo > hi).then(|| format!("{what} `{name}` has the range {lo} to {hi}"))
     })
-}
-
-fn meant(name: &str, known: &[&str]) -> String {
-    nearest(name, known).map(|near| format!("; did you mean `{near}`?")).unwrap_or_default()
 }

@@ -4,7 +4,7 @@
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SolverError {
     /// No adapter of that name.
-    #[error("no adapter named `{name}`{}; there are {known}", nearest.as_ref().map(|n| format!("; did you mean `{n}`?")).unwrap_or_default())]
+    #[error("no adapter named `{name}`{}; there are {known}", starlings_models::meant(nearest.as_ref()))]
     Adapter {
         /// The name given.
         name: String,

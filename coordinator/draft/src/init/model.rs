@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 use starlings_models::catalogue::{self, EQUATIONS};
-use starlings_models::{ModelDef, SolverDef, Spec, nearest};
+use starlings_models::{ModelDef, SolverDef, Spec, meant, nearest};
 use starlings_study::SolverHost;
 use toml_edit::{DocumentMut, Item, Table};
 
@@ -67,7 +67,7 @@ fn of_kind(kind: &str) -> Result<Model, String> {
     let mut specs = catalogue::specs();
     let known: Vec<String> = specs.iter().map(|spec| spec.kind.clone()).collect();
     let Some(at) = known.iter().position(|known| known == kind) else {
-        let hint = nearest(kind, &known).map(|near| format!("; did you mean `{near}`?")).unwrap_or_default();
+        let hint = meant(nearest(kind, &known));
         return Err(format!("no model named `{kind}`{hint} (known: {})", known.join(", ")));
     };
     let spec = (kind != EQUATIONS).then(|| specs.swap_remove(at));

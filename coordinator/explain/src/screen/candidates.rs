@@ -3,7 +3,7 @@
 //! A wrong name or an empty list is an error before the first run. Next file to read: [`crate::options`].
 
 use starlings_models::effect::library::{FAMILIES, family_of, library_in, shows_in};
-use starlings_models::{BuildSetup, EffectDef, Setup, nearest};
+use starlings_models::{BuildSetup, EffectDef, Setup, did_you_mean, nearest};
 use starlings_study::Study;
 use starlings_study::checked::{Library, PROPOSALS};
 
@@ -138,7 +138,7 @@ fn check_name(name: &str, study: &Study, all: &[&EffectDef]) -> Result<(), Expla
         return Ok(());
     }
     let help = match nearest(name, &known) {
-        Some(near) => format!("did you mean `{near}`?"),
+        Some(near) => did_you_mean(near),
         None => "`starlings effects STUDY` lists what would be tried".to_owned(),
     };
     Err(ExplainError::Name(format!("no effect is named `{name}`: {help}")))

@@ -3,6 +3,7 @@
 //! Sentences about noise are in [`crate::judge::adequacy`], those about held-out data in [`crate::judge::held_out`]. Next file
 //! to read: [`super::warnings`].
 
+use starlings_models::quoted_list;
 use std::fmt::Write as _;
 
 use starlings_estimators::correlation;
@@ -210,8 +211,7 @@ fn same(decision: &Decision) -> String {
     if decision.synonyms.is_empty() {
         return String::new();
     }
-    let names: Vec<String> = decision.synonyms.iter().map(|name| format!("`{name}`")).collect();
-    format!(" The same effect by another name: {}.", names.join(", "))
+    format!(" The same effect by another name: {}.", quoted_list(&decision.synonyms))
 }
 
 /// What is left beside the name, where that is no noise: how much, and where it shows in what was held out. Empty where nothing is.

@@ -5,8 +5,8 @@
 
 use std::ops::Range;
 
-use starlings_models::SetupError;
 use starlings_models::equations::Expression;
+use starlings_models::{SetupError, did_you_mean, nearest};
 use toml::Spanned;
 
 use crate::expand::INITIAL;
@@ -50,7 +50,7 @@ pub(crate) fn blame(source: &Source, file: &StudyFile, error: &SetupError) {
             let span = place(file, name).unwrap_or_else(|| file.model.kind.span());
             let message = format!("no {what} is named `{name}`");
             match nearest {
-                Some(near) => source.report_with(span, message, format!("did you mean `{near}`?")),
+                Some(near) => source.report_with(span, message, did_you_mean(near)),
                 None if *what == "model" => {
                     source.report_with(span, message, "`starlings models` lists them");
                 }
@@ -109,10 +109,10 @@ pub(crate) fn report_missing(source: &Source, file: &StudyFile, model: &str, nam
         Some(start..character(&source.text, &text.span(), column + name.chars().count() - 1).end)
     });
     let known: Vec<String> = names(file).into_iter().skip(1).map(|n| n.get_ref().clone()).collect();
-    let near = starlings_models::nearest(name, &known);
+    let near = nearest(name, &known);
     let help = match near.filter(|_| used.is_some()) {
         Some(near) => {
-            format!("did you mean `{near}`? Otherwise give it a value in `constants` or as `[[parameters]]`")
+            format!("{} Otherwise give it a value in `constants` or as `[[parameters]]`", did_you_mean(near))
         }
         None => "give it a value in `constants`, or add it as `[[parameters]]`".to_owned(),
     };

@@ -11,7 +11,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use starlings_models::equations::{Drift, EquationsDef};
-use starlings_models::{Setup, SetupError, SumsDef};
+use starlings_models::{Setup, SetupError, SumsDef, did_you_mean};
 use toml::Spanned;
 
 use super::built::CheckedModel;
@@ -112,7 +112,7 @@ fn check_functions(
                     listed.clone().find(|p| *p.get_ref() == name).map_or(section.span.clone(), Spanned::span);
                 let message = format!("no {what} is named `{name}`");
                 match nearest {
-                    Some(near) => source.report_with(span, message, format!("did you mean `{near}`?")),
+                    Some(near) => source.report_with(span, message, did_you_mean(near)),
                     None => source.report_with(span, message, "name a parameter that a state's rate uses"),
                 }
             }

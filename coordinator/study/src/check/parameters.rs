@@ -2,7 +2,7 @@
 //!
 //! Next file to read: [`super::prior`].
 
-use starlings_models::Spec;
+use starlings_models::{Spec, quoted_list};
 use toml::Spanned;
 
 use super::built::{CheckedModel, quantity, valid_names};
@@ -21,10 +21,7 @@ pub(crate) fn priors(
 ) -> Vec<Option<Prior>> {
     if file.parameters.is_empty() && file.needs_parameter {
         let end = source.text.len();
-        let help = format!(
-            "add `[[parameters]]`; the model has {}",
-            crate::problem::quoted_list(&valid_names(&model.spec))
-        );
+        let help = format!("add `[[parameters]]`; the model has {}", quoted_list(valid_names(&model.spec)));
         source.report_with(end..end, "the study has no parameter to estimate", help);
     }
     let check = |(i, parameter): (usize, &ParameterSection)| {

@@ -4,11 +4,11 @@
 
 use starlings_models::catalogue::NATIVE;
 use starlings_models::spectrum::{LinearisedSetup, SpectrumError};
-use starlings_models::{BuildSetup, SOLVER};
+use starlings_models::{BuildSetup, SOLVER, quoted_list};
 
 use super::load::Purpose;
 use crate::file::ObserverSection;
-use crate::problem::{Source, quoted_list};
+use crate::problem::Source;
 use crate::{Study, posterior};
 
 /// Reports observers that correct the same state, or are unstable together though each is stable.

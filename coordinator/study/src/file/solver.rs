@@ -5,7 +5,7 @@
 
 use std::ops::Range;
 
-use starlings_models::Role;
+use starlings_models::{Role, did_you_mean, nearest, quoted_list};
 use starlings_proto::adapters::{AdapterDef, NamedBy};
 use toml::Spanned;
 
@@ -13,7 +13,7 @@ use super::Named;
 use super::memory::memory;
 use super::quantity::{role, unit};
 use super::table::{Node, Table, named_texts, text, wrong_type};
-use crate::problem::{Source, quoted_list};
+use crate::problem::Source;
 
 /// Keys of `[model]` that only a solver has.
 pub(crate) const KEYS: [&str; 18] = [
@@ -233,9 +233,9 @@ fn quantities(source: &Source, model: &Table<'_>, key: &str, keys: &[&str]) -> V
 fn check_rule(source: &Source, rule: &Spanned<String>) {
     let kind = rule.get_ref().split(':').next().unwrap_or_default();
     if !RULES.contains(&kind) {
-        let near = starlings_models::nearest(kind, RULES);
+        let near = nearest(kind, RULES);
         let help = match near {
-            Some(near) => format!("did you mean `{near}`?"),
+            Some(near) => did_you_mean(near),
             None => {
                 "such as `json`, `csv:FILE:COLUMN`, `column:FILE:NUMBER` or `regex:FILE:PATTERN`".to_owned()
             }
@@ -243,7 +243,7 @@ fn check_rule(source: &Source, rule: &Spanned<String>) {
         let message = format!(
             "`{}` is no rule to read an output: it begins with none of {}",
             rule.get_ref(),
-            quoted_list(&RULES)
+            quoted_list(RULES)
         );
         source.report_with(rule.span(), message, help);
     }

@@ -3,6 +3,7 @@
 //! The tables are walked by hand and not through a derive: a derive stops at the first fault, and loses the place of a value
 //! that may have several types. Next file to read: [`super::read`].
 
+use starlings_models::nearest;
 use std::cell::RefCell;
 use std::ops::Range;
 
@@ -54,7 +55,7 @@ impl<'a> Table<'a> {
                     Some(help) => source.report_with(key.span(), message, help),
                     None => source.report(key.span(), message),
                 }
-                table.meant.borrow_mut().extend(starlings_models::nearest(key.get_ref(), &valid));
+                table.meant.borrow_mut().extend(nearest(key.get_ref(), &valid));
             }
         }
         table

@@ -1,7 +1,7 @@
 //! What is asked of a forecast, and what it makes of a study: a setup, times, the outputs that are recorded.
 
 use starlings_estimators::forecast::Level;
-use starlings_models::{BuildSetup, ObserverDef, Setup, nearest};
+use starlings_models::{BuildSetup, ObserverDef, Setup, meant, nearest};
 
 use super::StudyForecastError;
 use crate::Study;
@@ -128,8 +128,7 @@ impl Ask {
         let asked = self.thresholds.iter().map(|t| t.output.clone());
         for name in measured.cloned().chain(asked) {
             if !possible.contains(&name) {
-                let hint =
-                    nearest(&name, &possible).map(|n| format!("; did you mean `{n}`?")).unwrap_or_default();
+                let hint = meant(nearest(&name, &possible));
                 let message = format!("no output or scalar state named `{name}`{hint}");
                 return Err(StudyForecastError::Request(message));
             }
@@ -197,7 +196,7 @@ fn known(study: &Study, name: &str) -> Result<(), StudyForecastError> {
     if names.iter().any(|known| known == name) {
         return Ok(());
     }
-    let hint = nearest(name, &names).map(|n| format!("; did you mean `{n}`?")).unwrap_or_default();
+    let hint = meant(nearest(name, &names));
     Err(StudyForecastError::Request(format!(
         "--set {name}: the study has no parameter, constant or initial value of that name{hint}"
     )))

@@ -2,6 +2,7 @@
 //!
 //! Next files to read: [`super::part`] for fields, [`super::noise`], [`super::input`].
 
+use starlings_models::quoted_list;
 use starlings_models::units::{rounded, spaced};
 
 use super::Context;
@@ -12,7 +13,6 @@ use super::part::Part;
 use super::reader::{ChannelReader, measured_somewhere};
 use crate::checked::Channel;
 use crate::file::ChannelSection;
-use crate::problem::quoted_list;
 
 impl ChannelReader<'_> {
     /// All channels, their values still at every row of the file; `None` when a problem was reported.

@@ -2,13 +2,14 @@
 //!
 //! Every complaint names the line and the column. Next file to read: [`crate::record`].
 
+use starlings_models::{did_you_mean, nearest, quoted_list};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::separator::Foreign;
 use crate::file::locate::{csv_field, line_column};
-use crate::problem::{Problem, Source, StudyError, suggestion};
+use crate::problem::{Problem, Source, StudyError};
 
 /// Where a row begins.
 #[derive(Debug)]
@@ -162,10 +163,10 @@ impl Csv {
     }
 
     fn columns_help(&self, column: &str) -> String {
-        let list = format!("its columns are {}", crate::problem::quoted_list(&self.headers));
-        match suggestion(column, &self.headers) {
-            Some(near) if near.starts_with("did you mean") => format!("{near} {list}"),
-            _ => list,
+        let list = format!("its columns are {}", quoted_list(&self.headers));
+        match nearest(column, &self.headers) {
+            Some(near) => format!("{} {list}", did_you_mean(near)),
+            None => list,
         }
     }
 

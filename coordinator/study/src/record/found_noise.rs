@@ -3,7 +3,7 @@
 //! Next file to read: [`super::pooled_noise`].
 
 use super::channel::with_unit;
-use crate::problem::quoted_list;
+use starlings_models::quoted_list;
 
 /// Records that a warning names; of more it tells their number.
 const NAMED: usize = 3;

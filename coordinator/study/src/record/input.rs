@@ -2,12 +2,12 @@
 //!
 //! Next file to read: [`crate::plan`].
 
-use starlings_models::{Signal, Spec};
+use starlings_models::{Signal, Spec, nearest, quoted_list};
 use toml::Spanned;
 
 use super::{Recordings, Table};
 use crate::file::RecordSection;
-use crate::problem::{Source, quoted_list};
+use crate::problem::Source;
 
 /// The signals in the order of the model's inputs; `None` when a problem was reported.
 pub(crate) fn inputs(
@@ -43,7 +43,7 @@ pub(super) fn unknown_names(source: &Source, section: &RecordSection, spec: &Spe
     let known: Vec<String> = spec.inputs.iter().map(|q| q.name.clone()).collect();
     let mut meant = Vec::new();
     for (name, _) in section.inputs.iter().filter(|(n, _)| !known.contains(n.get_ref())) {
-        meant.extend(starlings_models::nearest(name.get_ref(), &known));
+        meant.extend(nearest(name.get_ref(), &known));
         let message = format!("model `{}` has no input `{}`", spec.kind, name.get_ref());
         if known.is_empty() {
             source.report_with(name.span(), message, "it needs none: remove `inputs`");

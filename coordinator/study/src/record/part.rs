@@ -3,7 +3,7 @@
 //! The columns of a field `wall` are `<column>[0]`, `<column>[1]`, …; those that the file lacks are not observed. Next file
 //! to read: [`super::channel`].
 
-use starlings_models::{Quantity, Spec};
+use starlings_models::{Quantity, Spec, quoted_list};
 
 use super::reader::ChannelReader;
 use crate::field::{component_of, quantity_of};
@@ -72,7 +72,7 @@ impl ChannelReader<'_> {
         let help = if self.table.csv.headers.contains(column) {
             format!("column `{column}` can measure one component: say which, as output = \"{name}[0]\"")
         } else {
-            format!("its columns are {}", crate::problem::quoted_list(&self.table.csv.headers))
+            format!("its columns are {}", quoted_list(&self.table.csv.headers))
         };
         self.source.report_with(section.column.span(), message, help);
     }

@@ -2,6 +2,7 @@
 //!
 //! Next file to read: [`super::mesh`] for meshes; what makes a surface is in `starlings_models::surface`.
 
+use starlings_models::quoted_list;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -10,7 +11,7 @@ use starlings_models::surface::{Mesh, Profile};
 
 use super::mesh::{Triangles, read};
 use super::{Csv, Table};
-use crate::problem::{Problem, Source, quoted_list};
+use crate::problem::{Problem, Source};
 use crate::surfaces::{Shape, Shapes, length};
 
 /// Times closer than this, relative to their size, are one.

@@ -4,7 +4,7 @@
 
 use std::sync::Arc;
 
-use starlings_models::{Role, Spec};
+use starlings_models::{Role, Spec, quoted_list};
 
 use super::Context;
 use super::noise::unusable;
@@ -13,7 +13,6 @@ use super::shapes::Surfaces;
 use super::surface_files::SurfaceFiles;
 use crate::checked::Channel;
 use crate::file::{ChannelSection, SurfaceSection};
-use crate::problem::quoted_list;
 use crate::surfaces::Node;
 
 impl ChannelReader<'_> {

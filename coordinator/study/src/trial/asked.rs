@@ -2,13 +2,13 @@
 //!
 //! Next file to read: [`crate::predicted`], which asks for them at draws of the posterior.
 
+use starlings_models::quoted_list;
 use std::sync::Arc;
 
 use super::dry_run::Depth;
 use super::{Fault, Runner, TrialError, named, run};
 use crate::field::observed_fields;
 use crate::predicted::members::{step_of, window_of};
-use crate::problem::quoted_list;
 use crate::{Study, posterior};
 
 /// Whether predictions ask for more than the trial of what is measured: other outputs, or other times.
@@ -32,7 +32,7 @@ pub(super) fn predictions(study: &Study, depth: Depth, model: &dyn Runner) -> Re
             let record = record.name.clone();
             match fault {
                 Fault::Run(source) => TrialError::Predict {
-                    outputs: quoted_list(&observed_fields(&study.predict.outputs)),
+                    outputs: quoted_list(observed_fields(&study.predict.outputs)),
                     record,
                     values: named(study, &theta),
                     source,

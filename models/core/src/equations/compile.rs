@@ -8,6 +8,7 @@ use super::node::{Name, Node, Operation};
 use super::program::Program;
 use super::tape::{Operand, Writer};
 use super::values::{self, Source};
+use crate::meant;
 
 /// Deepest expression: so many values may wait for others at a time.
 const MAX_WAITING: usize = 64;
@@ -70,8 +71,7 @@ fn source(slot: Slot) -> Source {
 impl Compiler<'_> {
     fn slot(&self, name: &Name) -> Result<Slot, ExpressionError> {
         (self.resolve)(&name.text).ok_or_else(|| {
-            let hint =
-                (self.nearest)(&name.text).map(|n| format!("; did you mean `{n}`?")).unwrap_or_default();
+            let hint = meant((self.nearest)(&name.text));
             ExpressionError::new(name.column, format!("unknown name `{}`{hint}", name.text))
         })
     }

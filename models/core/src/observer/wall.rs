@@ -6,9 +6,9 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::measured::{mean_innovation, shown};
 use super::{Correction, Wiring, one};
-use crate::SetupError;
 use crate::setup::ObserverDef;
 use crate::{Blocks, Model, NativeModels, Spec};
+use crate::{SetupError, quoted_list};
 
 /// Which of the wall's outputs an observer takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -172,8 +172,7 @@ pub(super) fn hosted<T>(
         return Ok(part);
     }
     let hosts = hosts(def, wiring.native)?;
-    let hosts: Vec<String> = hosts.iter().map(|kind| format!("`{kind}`")).collect();
-    let hosts = if hosts.is_empty() { "none of the built-in models".to_owned() } else { hosts.join(", ") };
+    let hosts = if hosts.is_empty() { "none of the built-in models".to_owned() } else { quoted_list(hosts) };
     Err(SetupError::Invalid(format!(
         "the observer `{}` cannot be hosted by the model `{}`, which lacks the part of a fluid–structure system \
          that it corrects; models that can host it: {hosts}; with any model the observer `nudging` pulls observed \

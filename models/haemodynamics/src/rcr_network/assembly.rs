@@ -3,7 +3,7 @@
 //! Next file to read: [`super::elements`], which adds one element; then [`super::circuit`].
 
 use starlings_models_core::layout::fault;
-use starlings_models_core::{Quantity, SetupError, nearest};
+use starlings_models_core::{Quantity, SetupError, did_you_mean, meant, nearest, quoted_list};
 
 use super::circuit::{Circuit, Ends, FlowOf, Resistive, Tie, TieKind};
 use super::netlist::{Element, GROUND, Gauge, Kind, Netlist};
@@ -80,8 +80,8 @@ impl Assembly {
         }
         let find = |name: &String, end: &str| {
             self.circuit.nodes.iter().position(|node| node == name).ok_or_else(|| {
-                let near = nearest(name, &self.circuit.nodes).map(|n| format!("; did you mean `{n}`?"));
-                let message = format!("no node named `{name}`{}", near.unwrap_or_default());
+                let near = meant(nearest(name, &self.circuit.nodes));
+                let message = format!("no node named `{name}`{near}");
                 fault(&format!("{path}.{end}"), message)
             })
         };
@@ -139,8 +139,8 @@ impl Assembly {
             return Ok(at);
         }
         if self.declared {
-            let near = nearest(name, &self.circuit.nodes).map(|n| format!("; did you mean `{n}`?"));
-            let message = format!("no node named `{name}` in `nodes`{}", near.unwrap_or_default());
+            let near = meant(nearest(name, &self.circuit.nodes));
+            let message = format!("no node named `{name}` in `nodes`{near}");
             return Err(fault(path, message));
         }
         check_name(name, "a node", path)?;
@@ -240,7 +240,7 @@ impl Assembly {
                     netlist.elements.iter().filter(own).flat_map(|e| [&e.from, &e.to]).flatten().collect();
                 let others = self.circuit.nodes.iter().filter(|node| !own.contains(node));
                 let remedy = match nearest(name, others) {
-                    Some(near) => format!("did you mean `{near}`? Otherwise declare all nodes in `nodes`"),
+                    Some(near) => format!("{} Otherwise declare all nodes in `nodes`", did_you_mean(near)),
                     None => "if that is meant, declare all nodes in `nodes`".to_owned(),
                 };
                 let message = format!("only one element ends at node `{name}`: {remedy}");
@@ -263,8 +263,8 @@ fn check_name(name: &str, what: &str, path: &str) -> Result<(), SetupError> {
 fn check_keys(element: &Element, path: &str) -> Result<(), SetupError> {
     let (kind, keys) = (element.kind, element.kind.keys());
     if let Some(key) = element.written().into_iter().find(|key| !keys.contains(key)) {
-        let keys = keys.iter().map(|key| format!("`{key}`")).collect::<Vec<_>>().join(", ");
-        let message = format!("an element of kind `{}` has no `{key}` (it has {keys})", kind.word());
+        let has = quoted_list(keys);
+        let message = format!("an element of kind `{}` has no `{key}` (it has {has})", kind.word());
         return Err(fault(&format!("{path}.{key}"), message));
     }
     let ground = GROUND.to_owned();

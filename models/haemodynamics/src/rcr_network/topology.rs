@@ -4,8 +4,8 @@
 //! Each other tree has one unknown pressure, which the flows of the branches that leave it determine: tree and co-tree of
 //! a network's state equations (Chua, Desoer & Kuh 1987, ch. 12). Next file to read: [`super::solve`].
 
-use starlings_models_core::SetupError;
 use starlings_models_core::layout::fault;
+use starlings_models_core::{SetupError, quoted_list};
 
 use super::circuit::{Circuit, Ends, Tie};
 
@@ -96,10 +96,6 @@ impl Forest {
     }
 }
 
-fn list(names: &[&str]) -> String {
-    names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
-}
-
 /// The refusal of nodes without a resistive path to the ground.
 fn loose_nodes(circuit: &Circuit, loose: &dyn Fn(usize) -> bool) -> SetupError {
     let nodes: Vec<usize> = (0..circuit.nodes.len()).filter(|i| loose(*i)).collect();
@@ -110,14 +106,14 @@ fn loose_nodes(circuit: &Circuit, loose: &dyn Fn(usize) -> bool) -> SetupError {
     let injections = circuit.injections.iter().map(|b| (b.ends, b.says.as_str()));
     let cut: Vec<&str> =
         inertances.chain(injections).filter(|(ends, _)| crossing(*ends)).map(|(_, name)| name).collect();
-    let names = list(&names);
+    let names = quoted_list(&names);
     let message = if cut.is_empty() {
         format!(
             "{what} {names} {verb} no path to the ground `0` or to a pressure source: join it by a resistance or a \
              capacitor, or remove its elements"
         )
     } else {
-        let cut = list(&cut);
+        let cut = quoted_list(&cut);
         format!(
             "only {cut} lead to {what} {names}, and inertances and flow sources prescribe their flow: its pressure is \
              undetermined; add a capacitor to the ground there, or a resistance"
@@ -155,7 +151,7 @@ fn loop_of_ties(circuit: &Circuit, closing: usize) -> SetupError {
         }
     }
     let names: Vec<&str> = left.iter().map(|tie| circuit.ties[*tie].says.as_str()).collect();
-    let (names, from, to) = (list(&names), &circuit.nodes[from], &circuit.nodes[to]);
+    let (names, from, to) = (quoted_list(&names), &circuit.nodes[from], &circuit.nodes[to]);
     fault(
         path,
         format!(

@@ -25,7 +25,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-use starlings_models::{Description, ParticleError, Run, Solved, SolverDef, Spec, Timeout, nearest};
+use starlings_models::{Description, ParticleError, Run, Solved, SolverDef, Spec, Timeout, meant, nearest};
 use starlings_proto::adapters::{AdapterDef, NamedBy};
 
 use super::Adapter;
@@ -289,7 +289,7 @@ fn rules(reads: &BTreeMap<String, String>, spec: &Spec) -> Result<BTreeMap<Strin
     for (name, text) in reads {
         if spec.outputs.iter().all(|q| q.name != *name) {
             let near = nearest(name, spec.outputs.iter().map(|q| &q.name));
-            let hint = near.map(|near| format!("; did you mean `{near}`?")).unwrap_or_default();
+            let hint = meant(near);
             return Err(SolverError::Incomplete(format!("a rule reads `{name}`, which is no output{hint}")));
         }
         let rule = Rule::parse(text, name)

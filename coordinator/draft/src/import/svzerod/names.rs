@@ -2,7 +2,7 @@
 //!
 //! Whether what is named fits there is seen where it is joined: [`super::blocks`].
 
-use starlings_models::nearest;
+use starlings_models::{did_you_mean, nearest};
 
 use super::file::File;
 
@@ -18,7 +18,7 @@ pub(super) fn check(file: &File) -> Result<(), String> {
         // What nothing else refers to is what is likely meant.
         let free = known.iter().filter(|known| !used.contains(*known));
         let hint = match nearest(name, free).or_else(|| nearest(name, known)) {
-            Some(near) => format!("did you mean `{near}`?"),
+            Some(near) => did_you_mean(near),
             None => format!("known are {}", known.join(", ")),
         };
         format!("{place}: no {what} is called `{name}`; {hint}")

@@ -8,6 +8,7 @@
 use super::blocks::Blocks;
 use super::file::{OneCapacitance, OneInductance, OneResistance, Vessel, VesselValues, typed};
 use super::network::{GROUND, Kind};
+use starlings_models::quoted_list;
 
 impl Vessel {
     /// Its values, whatever its type; what it does not have is zero.
@@ -71,15 +72,12 @@ impl Blocks {
                 }
             }
         }
-        let quoted = |names: &mut dyn Iterator<Item = &String>| {
-            names.map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
-        };
         if !self.passed.is_empty() {
-            let vessels = quoted(&mut self.passed.iter().map(|(name, _)| name));
+            let vessels = quoted_list(self.passed.iter().map(|(name, _)| name));
             let (have, their) = if self.passed.len() == 1 { ("has", "its") } else { ("have", "their") };
             self.network.notes.push(format!(
                 "{vessels} {have} neither a resistance nor an inertance: {their} two ends are one node, and the study has no {}",
-                quoted(&mut outputs.iter())
+                quoted_list(outputs.iter())
             ));
         }
     }

@@ -5,10 +5,11 @@
 use std::path::Path;
 
 use starlings_models::equations::EquationsDef;
+use starlings_models::quoted_list;
 
 use crate::file::{RecordSection, StudyFile};
 use crate::infer_choice::InferRecord;
-use crate::problem::{Source, quoted_list};
+use crate::problem::Source;
 
 /// The recordings that are used, in the order of the file.
 pub(super) fn records(source: &Source, file: &StudyFile, equations: &EquationsDef) -> Vec<InferRecord> {

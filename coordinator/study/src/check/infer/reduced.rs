@@ -4,6 +4,7 @@
 //! [`crate::infer_choice`].
 
 use starlings_models::equations::Expression;
+use starlings_models::{did_you_mean, nearest};
 use toml::Spanned;
 
 use crate::file::infer::ReducedSection;
@@ -44,8 +45,7 @@ fn check(source: &Source, text: &Spanned<String>, known: &[String]) {
             for (name, column) in expression.names().into_iter().filter(|(name, _)| !known.contains(name)) {
                 let span = character(&source.text, &text.span(), column);
                 let message = format!("the reduced model has no unknown `{name}`");
-                let near =
-                    starlings_models::nearest(&name, known).map(|near| format!("did you mean `{near}`?"));
+                let near = nearest(&name, known).map(did_you_mean);
                 source.report_with(
                     span,
                     message,

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::path::{Component, Path};
 use std::sync::Arc;
 
-use starlings_models::{Description, FaultPlace, SolverDef, SolverFault, nearest};
+use starlings_models::{Description, FaultPlace, SolverDef, SolverFault, did_you_mean, nearest};
 use toml::Spanned;
 
 use crate::file::Named;
@@ -153,7 +153,7 @@ fn beside(folder: &Path, name: &str) -> String {
         .collect();
     let file = name.rsplit('/').next().unwrap_or(name);
     match nearest(file, &present) {
-        Some(near) => format!("did you mean `{near}`?"),
+        Some(near) => did_you_mean(near),
         None => format!("files are looked for in `{}`, the folder of the study", folder.display()),
     }
 }

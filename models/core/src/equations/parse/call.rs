@@ -5,7 +5,7 @@
 use super::{FUNCTIONS, Parser};
 use crate::equations::ExpressionError;
 use crate::equations::node::{Function, Name, Node, Operation};
-use crate::nearest;
+use crate::{meant, nearest};
 
 impl Parser {
     /// A call, from behind its opening parenthesis.
@@ -40,7 +40,7 @@ impl Parser {
             unknown => {
                 let hint = match (elsewhere(unknown), nearest(unknown, FUNCTIONS)) {
                     (Some(here), _) => format!("; {here}"),
-                    (None, Some(near)) => format!("; did you mean `{near}`?"),
+                    (None, near @ Some(_)) => meant(near),
                     (None, None) => format!("; a product is written `{unknown}*(...)`"),
                 };
                 return Err(ExpressionError::new(

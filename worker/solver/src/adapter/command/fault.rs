@@ -2,6 +2,8 @@
 //!
 //! Next file to read: [`super::results`].
 
+use starlings_models::meant;
+
 /// Why an output cannot be read.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub(super) enum Fault {
@@ -41,10 +43,6 @@ pub(super) fn shape(size: usize, n_times: usize) -> String {
 
 fn plural(n: usize) -> &'static str {
     if n == 1 { "" } else { "s" }
-}
-
-fn meant(nearest: Option<&String>) -> String {
-    nearest.map(|name| format!("; did you mean `{name}`?")).unwrap_or_default()
 }
 
 /// Names that a message lists.

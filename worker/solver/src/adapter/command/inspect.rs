@@ -12,7 +12,7 @@ use starlings_models::{
 
 use super::request::{command, placeholders};
 use super::rule::Rule;
-use super::template::{Templates, meant, names, stands_for_nothing};
+use super::template::{Templates, names, nothing_named, stands_for_nothing};
 use crate::error::ABSENT;
 
 /// Everything that can be told of a program of files before it is started.
@@ -115,7 +115,7 @@ fn used(file: &str, text: &str, spec: &Spec) -> Result<Used, (usize, String)> {
         let name = path.rsplit('.').next().unwrap_or_default();
         text.lines().position(|line| line.contains(name)).map_or(1, |i| i + 1)
     };
-    let unknown = wrong.iter().map(|path| (line(path), meant(path, &names))).collect();
+    let unknown = wrong.iter().map(|path| (line(path), nothing_named(path, &names))).collect();
     Ok(Used { paths: paths.into_iter().collect(), unknown })
 }
 

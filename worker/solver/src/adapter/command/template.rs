@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use minijinja::syntax::SyntaxConfig;
 use minijinja::value::{Value, ValueKind};
 use minijinja::{AutoEscape, Environment, ErrorKind, UndefinedBehavior};
-use starlings_models::{Run, Spec, nearest};
+use starlings_models::{Run, Spec, meant, nearest};
 
 use crate::SolverError;
 
@@ -90,7 +90,7 @@ impl Templates {
         if error.kind() == ErrorKind::UndefinedError
             && let Some(unknown) = self.unknown(file, line, names)
         {
-            reason = meant(&unknown, names);
+            reason = nothing_named(&unknown, names);
         }
         TemplateError { file: file.to_owned(), line, reason }
     }
@@ -107,10 +107,10 @@ impl Templates {
 }
 
 /// That a path stands for nothing, and what is near.
-pub(super) fn meant(unknown: &str, names: &Value) -> String {
+pub(super) fn nothing_named(unknown: &str, names: &Value) -> String {
     let (inside, name) = unknown.rsplit_once('.').unwrap_or(("", unknown));
     let known = keys(&if inside.is_empty() { names.clone() } else { at(inside, names) });
-    let hint = nearest(name, &known).map(|near| format!("; did you mean `{near}`?")).unwrap_or_default();
+    let hint = meant(nearest(name, &known));
     format!("nothing is named `{unknown}`{hint}; there are {}", known.join(", "))
 }
 

@@ -7,7 +7,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
-use starlings_models::{SolverDef, nearest};
+use starlings_models::{SolverDef, meant, nearest};
 
 use super::client::{Client, Trouble};
 use crate::SolverError;
@@ -205,8 +205,8 @@ fn model(wanted: Option<&str>, info: &Value) -> Result<String, String> {
     match (wanted, models.as_slice()) {
         (Some(wanted), models) if models.iter().any(|name| name == wanted) => Ok(wanted.to_owned()),
         (Some(wanted), models) => {
-            let near = nearest(wanted, models).map(|near| format!("; did you mean `{near}`?"));
-            Err(format!("it has no model `{wanted}`; it has {known}{}", near.unwrap_or_default()))
+            let near = meant(nearest(wanted, models));
+            Err(format!("it has no model `{wanted}`; it has {known}{near}"))
         }
         (None, [only]) => Ok(only.clone()),
         (None, []) => Err("it has no model".to_owned()),

@@ -1,4 +1,4 @@
-//! The nearest valid name for a mistyped one, for error messages.
+//! Names in error messages: the nearest valid one for a mistyped one, the question for it, and lists.
 //!
 //! Next file to read: [`crate::setup`], which reports names.
 
@@ -27,9 +27,40 @@ where
     best.map(|(_, candidate)| candidate)
 }
 
+/// The question whether a near name was meant.
+pub fn did_you_mean(near: impl AsRef<str>) -> String {
+    format!("did you mean `{}`?", near.as_ref())
+}
+
+/// The same as the end of a message, which is empty where no name is near.
+pub fn meant(near: Option<impl AsRef<str>>) -> String {
+    near.map(|near| format!("; {}", did_you_mean(near))).unwrap_or_default()
+}
+
+/// Names in backticks, separated by commas.
+pub fn quoted_list<I, S>(names: I) -> String
+where
+    I: IntoIterator<Item = S>,
+    S: AsRef<str>,
+{
+    names.into_iter().map(|name| format!("`{}`", name.as_ref())).collect::<Vec<_>>().join(", ")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_message_ends_in_a_question_where_a_name_is_near() {
+        assert_eq!(meant(nearest("flwo", ["flow"])), "; did you mean `flow`?");
+        assert_eq!(meant(nearest("flwo", ["pressure"])), "");
+    }
+
+    #[test]
+    fn a_list_has_each_name_in_backticks() {
+        assert_eq!(quoted_list(["R", "C"]), "`R`, `C`");
+        assert_eq!(quoted_list::<[&str; 0], _>([]), "");
+    }
 
     #[test]
     fn a_slip_of_the_finger_finds_its_name() {
