@@ -167,6 +167,24 @@ fn a_column_that_numbers_the_rows_is_neither_measured_nor_the_time_where_there_i
 }
 
 #[test]
+fn a_column_that_switches_is_told_to_look_like_an_input() {
+    let table = "time (min),power [W],T_degC\n".to_owned() + &rows(40, |k, p, v| format!("{k},{p},{v:.3}"));
+    let switching = folder("tank.csv", &table);
+    let (study, notes) = drafted(switching.path(), &["tank.csv"]);
+    assert!(study.contains("level_power"), "{study}");
+    assert!(
+        notes.contains("`power [W]` switches between a few values") && notes.contains("write --input power"),
+        "{notes}"
+    );
+    let (_, notes) = drafted(switching.path(), &["tank.csv", "--input", "power", "--out", "driven"]);
+    assert!(!notes.contains("--input"), "{notes}");
+    let table = "t,a,b\n".to_owned() + &rows(40, |k, _, v| format!("{k},{v:.3},{:.3}", 2.0 * v));
+    let smooth = folder("two.csv", table);
+    let (_, notes) = drafted(smooth.path(), &["two.csv"]);
+    assert!(notes.contains("every column was taken for an output; --input COLUMN names"), "{notes}");
+}
+
+#[test]
 fn what_cannot_be_known_is_said_with_the_option_that_says_it() {
     // The first column does not increase, and none is called time.
     let table = "a,b\n".to_owned() + &rows(30, |k, p, v| format!("{},{v:.3}", p + (k % 3) as f64));

@@ -5,6 +5,8 @@
 
 use std::fmt::Write;
 
+use starlings_models::quoted_list;
+
 use super::parts::{NOISE, Unknown};
 use super::prior::Prior;
 use super::recording::{Column, Recording};
@@ -14,6 +16,10 @@ use crate::files::{part_of_range, quoted, rounded};
 
 /// Outputs at most where nobody chose them: each is two parameters.
 const MOST_OUTPUTS: usize = 6;
+
+/// Values at most of a column that switches, and rows at least that it stays at one, on average.
+const FEW: usize = 3;
+const STAYS: usize = 4;
 
 /// The roles of columns for which equations are written: what is no input is an output.
 pub(super) fn roles(
@@ -25,6 +31,7 @@ pub(super) fn roles(
 ) -> Result<Roles, String> {
     let columns = &recording.columns;
     let mut driving: Vec<usize> = inputs.iter().map(|(at, _)| *at).collect();
+    let mut roles = Roles::default();
     if inputs.is_empty() && outputs.is_empty() && columns.len() > 1 {
         let question = Question {
             text: "Which columns drive the system and are not predicted (several with commas between them)?"
@@ -33,11 +40,13 @@ pub(super) fn roles(
             default: Some("none".to_owned()),
             option: "--input COLUMN".to_owned(),
         };
-        let answer = ask(&question).unwrap_or_default();
+        let answer = ask(&question).unwrap_or_else(|| {
+            roles.notes.push(unasked(columns));
+            String::new()
+        });
         let named = answer.split(',').map(str::trim).filter(|name| !name.is_empty() && *name != "none");
         driving = named.map(place).collect::<Result<_, _>>()?;
     }
-    let mut roles = Roles::default();
     let varies = |column: &Column| {
         let mut finite = column.values.iter().filter(|v| v.is_finite());
         let first = finite.next();
@@ -64,6 +73,33 @@ pub(super) fn roles(
     roles.outputs =
         measured.iter().map(|at| (columns[*at].heading.clone(), columns[*at].name.clone(), *at)).collect();
     Ok(roles)
+}
+
+/// That nobody said which columns drive the system, with those that look as if they did.
+fn unasked(columns: &[Column]) -> String {
+    let switching: Vec<&Column> = columns.iter().filter(|column| switches(&column.values)).collect();
+    if switching.is_empty() || switching.len() == columns.len() {
+        return "every column was taken for an output; --input COLUMN names what drives the system"
+            .to_owned();
+    }
+    let names = quoted_list(switching.iter().map(|column| &column.heading));
+    let options: Vec<String> = switching.iter().map(|column| format!("--input {}", column.name)).collect();
+    let (switches, it) = if switching.len() == 1 { ("switches", "it does") } else { ("switch", "they do") };
+    format!(
+        "{names} {switches} between a few values, as what drives a system does, and every column was taken for an output: \
+         if {it} drive it, write {}",
+        options.join(" ")
+    )
+}
+
+/// Whether a column stays at one of a few values and jumps to another.
+fn switches(values: &[f64]) -> bool {
+    let finite: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
+    let mut levels = finite.clone();
+    levels.sort_by(f64::total_cmp);
+    levels.dedup();
+    let changes = finite.windows(2).filter(|pair| pair[0].to_bits() != pair[1].to_bits()).count();
+    (2..=FEW).contains(&levels.len()) && STAYS * changes <= finite.len()
 }
 
 /// Unknowns and lines of `[model]`.
