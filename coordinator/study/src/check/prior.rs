@@ -32,6 +32,9 @@ pub(crate) fn prior(
     let before = source.count();
     let transform = transform(source, written);
     let sd = transform.and_then(|t| spread(source, written, &t));
+    if let (Some(mean), Some(t)) = (&written.mean, transform) {
+        check_mean(source, written, mean, &t, sd);
+    }
     if let (Some(t), Some(q)) = (transform, quantity) {
         check_bounds(source, written, &t, q);
     }
@@ -60,6 +63,40 @@ pub(crate) fn prior(
     };
     let drift = drift(source, &parameter.process);
     (source.count() == before).then_some(Prior { transform: transform?, mean, sd: sd?, drift })
+}
+
+/// Refuses a mean where it is not the median, or stands beside one.
+fn check_mean(
+    source: &Source,
+    prior: &PriorSection,
+    mean: &Spanned<f64>,
+    transform: &Transform,
+    sd: Option<f64>,
+) {
+    if prior.median.as_ref().is_some_and(|median| median.span() != mean.span()) {
+        source.report_with(mean.span(), "`median` and `mean` exclude each other", "keep one of them");
+        return;
+    }
+    // Of a log-normal, E x = median exp(sd²/2), with sd of the natural logarithm (Johnson, Kotz & Balakrishnan 1994, ch. 14).
+    let of_logarithm = match transform {
+        Transform::Linear => return,
+        Transform::Log => sd,
+        Transform::Log2 => sd.map(|sd| sd * std::f64::consts::LN_2),
+        _ => None,
+    };
+    let help = of_logarithm.map_or_else(
+        || "write `median`: the value that lies in the middle of the probability".to_owned(),
+        |sd| {
+            let median = starlings_models::units::rounded(mean.get_ref() * (-0.5 * sd * sd).exp(), 3);
+            format!(
+                "write `median`; with this spread the mean is {} where the median is {median}",
+                mean.get_ref()
+            )
+        },
+    );
+    let message =
+        format!("a prior with the transform {} has a median, which is not its mean", transform.name());
+    source.report_with(mean.span(), message, help);
 }
 
 /// Whether a median can be transformed and lies in the range of its quantity; otherwise it is reported.

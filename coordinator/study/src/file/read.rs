@@ -109,6 +109,7 @@ fn prior(parameter: &Table<'_>) -> PriorSection {
         span: t.span.clone(),
         transform: t.text("transform"),
         median: t.number("median").or_else(|| t.number("mean")),
+        mean: t.number("mean"),
         median_from: t.text("median_from"),
         factor: t.number("factor"),
         sd: t.number("sd"),
