@@ -1,12 +1,13 @@
 //! The search: refits of the best candidates, then a second pass from the best of them with replacements and pairs.
 //!
-//! Files: [`search`], [`race`], [`instants`], [`ranking`], [`replacements`] of terms, [`pairs`], their [`members`] and [`finite`] where no effect explains the gap alone, [`second_pass`], and
+//! Files: [`search`], [`race`], [`near_priors`] (a second start), [`instants`], [`ranking`], [`replacements`] of terms, [`pairs`], their [`members`] and [`finite`] where no effect explains the gap alone, [`second_pass`], and
 //! [`modulated_forms`], whose effects ask whether the form of an effect is right.
 
 mod finite;
 mod instants;
 mod members;
 mod modulated_forms;
+mod near_priors;
 pub(crate) mod other_forms;
 mod pairs;
 mod race;

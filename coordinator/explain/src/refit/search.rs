@@ -88,6 +88,7 @@ pub(crate) fn search<'c>(
         let best = searcher.best_of_each(&found.screening);
         searcher.cache.foreseen.goes(Course::Refit);
         searcher.refit_singles(&mut found, &best)?;
+        searcher.refit_near_priors(&mut found)?;
         searcher.cache.foreseen.goes(Course::Open);
         searcher.replace_terms(&mut found)?;
         searcher.second_pass(&mut found, options)?;
@@ -100,7 +101,8 @@ pub(crate) fn search<'c>(
     Ok(found)
 }
 
-/// Goes on with candidates of one more kind, one at a time, where none of those before explains the gap. Whether there is any.
+/// Goes on with candidates of one more kind that promise a fall of χ² above `wanted`, one at a time, where none of those before explains the
+/// gap. Whether there is any.
 ///
 /// # Errors
 /// As [`search`].
@@ -110,7 +112,7 @@ pub(crate) fn search_further<'c>(
     candidates: &'c [Candidate],
     tracks: &[Track],
     options: &Options,
-    tried: &'static [Kind],
+    (tried, wanted): (&'static [Kind], f64),
 ) -> Result<bool, ExplainError> {
     let mut of_kind = candidates.iter().filter(|c| tried.contains(&c.kind));
     let Some(kind) = of_kind.next().map(|c| c.kind).filter(|_| options.only.is_empty()) else {
@@ -120,10 +122,39 @@ pub(crate) fn search_further<'c>(
     searcher.cache.foreseen.goes(Course::Open);
     searcher.cache.stage("screen", &format!("{}, since no other effect explains the gap", kind.plural()));
     let screening = searcher.screen_all(&found.base)?;
-    let best = searcher.best_of_each(&screening);
+    let mut best = searcher.best_of_each(&screening);
+    best.retain(|h| h.score.gain > wanted);
+    if best.is_empty() && wanted > 0.0 {
+        return Ok(false);
+    }
     searcher.widen(found, screening)?;
     searcher.refit_singles(found, &best)?;
+    if kind == Kind::Generic {
+        searcher.refit_near_priors(found)?;
+    }
     searcher.second_pass(found, &Options { max_effects: 1, ..options.clone() })?;
+    found.cut_short |= searcher.cut_short || searcher.cache.was_cut_short();
+    Ok(true)
+}
+
+/// Goes on with pairs that have a generic term, where nothing else explains the gap.
+///
+/// # Errors
+/// As [`search`].
+pub(crate) fn search_generic_pairs<'c>(
+    cache: &mut RunCache<'_>,
+    found: &mut SearchResult<'c>,
+    candidates: &'c [Candidate],
+    tracks: &[Track],
+    options: &Options,
+) -> Result<bool, ExplainError> {
+    let has_generic = found.screening.iter().any(|h| candidates[h.candidate].kind == Kind::Generic);
+    if !has_generic || !options.only.is_empty() || options.max_effects < 2 {
+        return Ok(false);
+    }
+    let mut searcher = Searcher { cache, candidates, tracks, cut_short: false, asked: false, tried: ASKED };
+    searcher.refit_pairs(found)?;
+    searcher.second_pass(found, options)?;
     found.cut_short |= searcher.cut_short || searcher.cache.was_cut_short();
     Ok(true)
 }
@@ -147,7 +178,7 @@ fn null_distribution(
 }
 
 impl<'c> Searcher<'_, '_, 'c> {
-    fn screen_all(&mut self, fit: &FittedVariant<'c>) -> Result<Vec<ScreeningResult>, ExplainError> {
+    pub(super) fn screen_all(&mut self, fit: &FittedVariant<'c>) -> Result<Vec<ScreeningResult>, ExplainError> {
         let of: Vec<(usize, usize)> = self
             .candidates
             .iter()
