@@ -1,6 +1,6 @@
 //! The search: refits of the best candidates, then a second pass from the best of them with replacements and pairs.
 //!
-//! Files: [`search`], [`race`], [`near_priors`] (a second start), [`instants`], [`ranking`], [`replacements`] of terms, [`pairs`], their [`members`] and [`finite`] where no effect explains the gap alone, [`second_pass`], and
+//! Files: [`search`], [`race`], [`near_priors`] (a second start), [`instants`], [`ranking`], [`replacements`] of terms, [`pairs`], their [`members`] and [`finite`] where no effect explains the gap alone, [`simpler`] terms in a pair, [`second_pass`], and
 //! [`modulated_forms`], whose effects ask whether the form of an effect is right.
 
 mod finite;
@@ -15,3 +15,4 @@ mod ranking;
 mod replacements;
 pub(crate) mod search;
 mod second_pass;
+mod simpler;

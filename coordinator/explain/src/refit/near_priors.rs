@@ -63,7 +63,9 @@ impl<'c> Searcher<'_, '_, 'c> {
         fits.truncate(FINAL);
         fits.iter_mut().for_each(|fit| fit.hold_own(f64::INFINITY));
         let mut fits = self.refit(fits)?;
-        fits.retain(|fit| !fit.residual().is_empty() && found.judged.iter().all(|j| !is_as_good(&j.fit, fit)));
+        fits.retain(|fit| {
+            !fit.residual().is_empty() && found.judged.iter().all(|j| !is_as_good(&j.fit, fit))
+        });
         found.judged.retain(|j| !fits.iter().any(|fit| is_same(&j.fit, fit)));
         self.judge_all(found, fits)
     }

@@ -154,8 +154,7 @@ impl<'c> Searcher<'_, '_, 'c> {
         let kind = |h: &ScreeningResult| self.candidates[h.candidate].kind;
         let all = found.passing().is_empty();
         let is_tried = |kind: Kind| self.tried.contains(&kind) && (all || kind != Kind::Instrument);
-        let is_usable =
-            |h: &&ScreeningResult| h.failure.is_none() && !h.is_imitated() && is_tried(kind(h));
+        let is_usable = |h: &&ScreeningResult| h.failure.is_none() && !h.is_imitated() && is_tried(kind(h));
         let usable = found.screening.iter().filter(is_usable);
         let mut best = largest_of_each(usable, |h| h.score.gain);
         best.truncate(self.cache.series_held().max(2));

@@ -154,6 +154,7 @@ pub(crate) fn search_generic_pairs<'c>(
     }
     let mut searcher = Searcher { cache, candidates, tracks, cut_short: false, asked: false, tried: ASKED };
     searcher.refit_pairs(found)?;
+    searcher.refit_simpler(found)?;
     searcher.second_pass(found, options)?;
     found.cut_short |= searcher.cut_short || searcher.cache.was_cut_short();
     Ok(true)
@@ -178,7 +179,10 @@ fn null_distribution(
 }
 
 impl<'c> Searcher<'_, '_, 'c> {
-    pub(super) fn screen_all(&mut self, fit: &FittedVariant<'c>) -> Result<Vec<ScreeningResult>, ExplainError> {
+    pub(super) fn screen_all(
+        &mut self,
+        fit: &FittedVariant<'c>,
+    ) -> Result<Vec<ScreeningResult>, ExplainError> {
         let of: Vec<(usize, usize)> = self
             .candidates
             .iter()
