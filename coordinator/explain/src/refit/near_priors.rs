@@ -56,12 +56,16 @@ impl<'c> Searcher<'_, '_, 'c> {
         let mut best = largest_of_each(screening.iter().filter(|h| h.failure.is_none()), |h| h.score.gain);
         best.truncate(MOST);
         let mut fits = best.iter().map(|h| self.with_candidate(&near, h)).collect::<Result<Vec<_>, _>>()?;
-        fits.iter_mut().for_each(|fit| fit.hold_own(NEAR));
+        for fit in &mut fits {
+            fit.hold_own(NEAR);
+        }
         self.cache.stage("refit", &format!("{} candidates near the priors", fits.len()));
         self.cut_short |= !drive_rounds(self.cache, &mut fits, ROUNDS)?;
         fits.sort_by(|a, b| a.promised().total_cmp(&b.promised()));
         fits.truncate(FINAL);
-        fits.iter_mut().for_each(|fit| fit.hold_own(f64::INFINITY));
+        for fit in &mut fits {
+            fit.hold_own(f64::INFINITY);
+        }
         let mut fits = self.refit(fits)?;
         fits.retain(|fit| {
             !fit.residual().is_empty() && found.judged.iter().all(|j| !is_as_good(&j.fit, fit))
