@@ -22,8 +22,9 @@ use crate::judge::search_result::SearchResult;
 use crate::judge::verdict::{Decision, Verdict, decide, limits};
 use crate::locate::{self, Track, UnknownInput};
 use crate::options::Options;
+use crate::refit::further::{search_further, search_generic_pairs};
 use crate::refit::other_forms::{search_other_forms, sole_effect};
-use crate::refit::search::{first_kinds, search, search_further};
+use crate::refit::search::{first_kinds, search};
 use crate::run_cache::{Course, Point, RunCache};
 use crate::screen::candidates::candidates;
 use crate::screen::proposals::{self, Proposals};
@@ -102,7 +103,7 @@ fn foresee(cache: &mut RunCache<'_>, candidates: &[Candidate], options: &Options
     cache.foreseen.candidates(tried().count(), tried().map(|c| c.points.len()).sum());
 }
 
-/// Decides, and goes on with generic terms and then with proposals while nothing explains the gap, or with other forms of what explains it.
+/// Decides, and goes on with generic terms, with proposals and with pairs while nothing explains the gap, or with other forms of what explains it.
 /// `proposed` takes the candidates with the proposals, where any are made. With the decision come the unknown inputs of the model as it is.
 fn decide_further<'c>(
     cache: &mut RunCache<'_>,
@@ -113,8 +114,8 @@ fn decide_further<'c>(
     options: &Options,
 ) -> Result<(Decision, Vec<UnknownInput>), ExplainError> {
     let mut decision = decide(cache, found, candidates)?;
-    if is_open(found, &decision)
-        && search_further(cache, found, candidates, tracks, options, &[Kind::Generic])?
+    if let Some(wanted) = wanted_of_generic(found, &decision)
+        && search_further(cache, found, candidates, tracks, options, (&[Kind::Generic], wanted))?
     {
         decision = decide(cache, found, candidates)?;
     }
@@ -127,7 +128,7 @@ fn decide_further<'c>(
         if !made.candidates.is_empty() {
             found.looked_at = made.looked_at();
             let all = proposed.get_or_init(|| candidates.iter().cloned().chain(made.candidates).collect());
-            search_further(cache, found, all, tracks, options, &[Kind::Proposal])?;
+            search_further(cache, found, all, tracks, options, (&[Kind::Proposal], 0.0))?;
             cache.stage("verdict", "");
             decision = decide(cache, found, all)?;
         }
@@ -139,6 +140,12 @@ fn decide_further<'c>(
         let all = proposed.get_or_init(|| candidates.iter().cloned().chain(made.candidates).collect());
         if search_other_forms(cache, found, all, tracks, options, named)? {
             cache.stage("verdict", "");
+            decision = decide(cache, found, all)?;
+        }
+    }
+    if decision.verdict == Verdict::Unexplained {
+        let all = proposed.get().map_or(candidates, Vec::as_slice);
+        if search_generic_pairs(cache, found, all, tracks, options)? {
             decision = decide(cache, found, all)?;
         }
     }
@@ -202,16 +209,19 @@ fn another_noise(cache: &RunCache<'_>, found: &SearchResult<'_>) -> Option<Vec<O
     (!noise.is_empty() && !alike(&noise, &cache.rows.noise)).then_some(noise)
 }
 
-/// Whether generic terms are tried: nothing explains the gap, an instrument's error is all that does, or an effect at a limit of a
-/// parameter inside it, which may be a simpler term.
-fn is_open(found: &SearchResult<'_>, decision: &Decision) -> bool {
-    let is_doubtful = |i: usize| {
-        found.judged[i].kinds().contains(&Kind::Instrument) || !limits(&found.judged[i]).is_empty()
-    };
+/// The fall of χ² that a generic term must promise to be tried: none where nothing explains the gap, or what does is an instrument's error or
+/// an effect at a limit of a parameter inside it, which may be a simpler term; as much as what explains it where that leaves more than noise,
+/// all of which a dependence may account for. Otherwise they are not tried.
+fn wanted_of_generic(found: &SearchResult<'_>, decision: &Decision) -> Option<f64> {
     match decision.verdict {
-        Verdict::Unexplained => true,
-        Verdict::Named | Verdict::Tie => decision.best.is_some_and(is_doubtful),
-        Verdict::NoGap => false,
+        Verdict::Unexplained => Some(0.0),
+        Verdict::Named | Verdict::Tie => {
+            let judged = &found.judged[decision.best?];
+            let is_doubtful = judged.kinds().contains(&Kind::Instrument) || !limits(judged).is_empty();
+            let leaves = judged.adequacy.is_gap_of_the_model() && judged.adequacy.rmse_over_noise > 1.0;
+            is_doubtful.then_some(0.0).or_else(|| leaves.then_some(judged.gain))
+        }
+        Verdict::NoGap => None,
     }
 }
 

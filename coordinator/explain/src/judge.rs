@@ -55,6 +55,7 @@ mod tests {
         let of = Path::new(env!("CARGO_MANIFEST_DIR"));
         let places = [
             "judge",
+            "refit/near_priors.rs",
             "refit/race.rs",
             "refit/instants.rs",
             "refit/other_forms.rs",

@@ -158,5 +158,11 @@ pub(crate) const TABLE: &[Case] = &[
     // The level stays above zero.
     case("one tank", "saturation", &[0.7, 0.4], &[Rate("h", "-0.7/(1 + 0.4/h)")]),
     case("one tank", "threshold", &[3.0, 0.9], &[Rate("h", "3*min(0.9 - h, 0)")]),
+    case(
+        "one tank",
+        "hidden-store",
+        &[1.5, 0.4, 0.7],
+        &[Rate("h", "1.5*(behind - h)"), State("behind", "0.7", "0.6*(h - behind)")],
+    ),
     case("rcr-network", "external-pressure:Pv_upper", &[1.0], &[Plus("Pv_upper", 1.0)]),
 ];

@@ -66,9 +66,14 @@ impl Candidate {
         self.def.states.iter().any(|state| names(&state.rate))
     }
 
-    /// Number of values inside its terms, but for widths that round a corner.
+    /// Number of values inside its terms, but for widths that round a corner and starts of states of its own.
     pub(crate) fn n_inner(&self) -> usize {
-        self.def.parameters.iter().skip(1).filter(|parameter| !parameter.is_rounding).count()
+        self.def.parameters.iter().skip(1).filter(|parameter| self.is_of_its_form(parameter)).count()
+    }
+
+    /// Whether a value inside its terms is part of its form. A width that rounds a corner is none, nor is where a state of its own starts.
+    pub(crate) fn is_of_its_form(&self, parameter: &EffectParameter) -> bool {
+        !parameter.is_rounding && self.def.states.iter().all(|state| state.initial != parameter.name)
     }
 
     /// The sign that its amplitude must have; 0 when both are possible.

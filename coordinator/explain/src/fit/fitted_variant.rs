@@ -91,6 +91,15 @@ impl<'c> FittedVariant<'c> {
         self.polish();
     }
 
+    /// Goes on from where it stands with the model's own parameters within so many prior standard deviations of their priors.
+    pub(crate) fn hold_own(&mut self, within: f64) {
+        self.variant.scaled.bounds[..self.variant.n_own].fill([-within, within]);
+        let (z, residual, jacobian) = self.solver.best();
+        let (z, residual, jacobian) = (z.clone(), residual.clone(), jacobian.clone());
+        self.solver =
+            LeastSquares::from_known(z, residual, jacobian, self.variant.scaled.clone(), ROUGH, TRIALS);
+    }
+
     /// Asks for measured Jacobians until it has converged.
     pub(crate) fn polish(&mut self) {
         self.solver.polish(TRIALS);

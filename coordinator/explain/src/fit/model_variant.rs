@@ -109,7 +109,7 @@ impl<'c> ModelVariant<'c> {
         self.study.theta.len()
     }
 
-    /// Number of values inside the terms of its effects, but for widths that round a corner.
+    /// Number of values inside the terms of its effects, but for widths that round a corner and starts of states of its own.
     pub(crate) fn n_inner(&self) -> usize {
         self.effects.iter().map(|effect| effect.candidate.n_inner()).sum()
     }

@@ -7,6 +7,7 @@ use super::contribution::{SECOND_SHARE, SMALL_SHARE};
 use super::form::{Leftover, white_noise, white_share};
 use super::gates::JudgedFit;
 use super::held_out::{FAR, forbidding};
+use super::noise_model::larger;
 use super::search_result::SearchResult;
 use crate::run_cache::RunCache;
 use crate::screen::screening_result::ScreeningResult;
@@ -77,7 +78,7 @@ pub(crate) fn objection(
     if let Some(because) = too_little(judged, &name) {
         return Some(because);
     }
-    if left.is_systematic && !is_remainder(cache, judged) {
+    if left.is_systematic && !is_remainder(cache, judged) && !is_noise_of_its_own(cache, judged) {
         let unseen = judged.misfit.n_held_out > 0 || !judged.held_out.is_empty();
         let held_out = if unseen {
             format!(" and {:.0} on the held-out data", left.gain_held_out)
@@ -104,7 +105,7 @@ pub(crate) fn objection(
         return leaves_most(&judged.adequacy, judged.share)
             .then(|| takes_only(&name, judged.share, "training data", "larger than the noise"));
     }
-    if judged.kinds().iter().any(|kind| kind.is_of_no_field()) {
+    if judged.kinds().iter().any(|kind| kind.is_of_no_field()) && !is_all_but_noise(cache, judged) {
         return Some(format!(
             "`{name}` comes nearest, but what is left is not noise: it describes a dependence and not its cause, and such a term is \
              named only where it leaves nothing else"
@@ -125,6 +126,20 @@ fn is_remainder(cache: &RunCache<'_>, judged: &JudgedFit<'_>) -> bool {
 /// nowhere far from it: then it may be that noise.
 fn may_be_noise_with_memory(cache: &RunCache<'_>, judged: &JudgedFit<'_>) -> bool {
     !is_stated(cache) && is_next_to_nothing(judged)
+}
+
+/// Whether what is left may be noise, and is too little for anything else: no larger than the noise, it leaves no room for something on top.
+fn is_all_but_noise(cache: &RunCache<'_>, judged: &JudgedFit<'_>) -> bool {
+    let is_within = judged.adequacy.rmse_over_noise <= 1.0 && is_next_to_nothing(judged);
+    judged.share >= 1.0 - SMALL_SHARE
+        && (is_within || is_remainder(cache, judged) || may_be_noise_with_memory(cache, judged))
+}
+
+/// Whether the noise was found and what is left may all be noise with a memory, too little for anything else.
+fn is_noise_of_its_own(cache: &RunCache<'_>, judged: &JudgedFit<'_>) -> bool {
+    judged.share >= 1.0 - SMALL_SHARE
+        && may_be_noise_with_memory(cache, judged)
+        && !larger(&cache.rows, &judged.fit.predicted).is_empty()
 }
 
 /// Whether what is left above the noise is less than a further effect would have to bring, and nothing is far from it, held out or not.

@@ -192,7 +192,7 @@ pub(crate) fn limits(judged: &JudgedFit<'_>) -> Vec<String> {
     let mut limits = Vec::new();
     for (m, effect) in variant.effects.iter().enumerate() {
         for (k, parameter) in effect.candidate.def.parameters.iter().enumerate().skip(1) {
-            if parameter.is_rounding {
+            if !effect.candidate.is_of_its_form(parameter) {
                 continue;
             }
             let j = variant.first_entry_of(m) + k;
@@ -209,9 +209,14 @@ pub(crate) fn limits(judged: &JudgedFit<'_>) -> Vec<String> {
 /// Number of operations in the terms of a variant; of variants that are equal otherwise the one with the fewest is shown.
 fn complexity(judged: &JudgedFit<'_>) -> usize {
     let terms = judged.fit.variant.effects.iter().flat_map(|m| &m.candidate.def.adds);
+    terms.filter_map(|add| n_operations(&add.term)).sum()
+}
+
+/// Number of operations in a term, whatever its sign.
+fn n_operations(term: &str) -> Option<usize> {
     let resolve = |_: &str| Some(Slot::Parameter(0));
-    let size = |term: &String| Expression::parse(term).ok()?.compile(&resolve, &|_| None).ok();
-    terms.filter_map(|add| size(&add.term)).map(|program| program.n_operations()).sum()
+    let unsigned = Expression::parse(term.trim_start_matches('-')).ok()?;
+    Some(unsigned.compile(&resolve, &|_| None).ok()?.n_operations())
 }
 
 /// Candidates that were not refitted and whose influence cannot be told from that of the best. Of forms that stand for no cause, which are
@@ -254,6 +259,12 @@ fn twins(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_loss_is_as_simple_as_a_gain() {
+        assert_eq!(n_operations("-k*x"), n_operations("k*y"));
+        assert!(n_operations("-k*x*abs(x)") > n_operations("k*x"));
+    }
 
     #[test]
     fn of_a_tie_the_best_supported_is_told_and_the_simplest_only_of_what_is_equally_so() {

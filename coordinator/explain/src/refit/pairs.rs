@@ -15,6 +15,7 @@ use crate::fit::kind::Kind;
 use crate::fit::model_variant::{AddedEffect, ModelVariant};
 use crate::judge::contribution::SECOND_SHARE;
 use crate::judge::effective_noise::inflation;
+use crate::judge::gates::JudgedFit;
 use crate::judge::search_result::SearchResult;
 use crate::judge::verdict::ALIKE;
 use crate::run_cache::Course;
@@ -69,15 +70,14 @@ impl<'c> Searcher<'_, '_, 'c> {
             let left = optimum.residual() - taken;
             let noise = inflation(&self.cache.rows, &left.rows(0, self.cache.rows.train.len()).into_owned());
             if pair.gain > noise * threshold
+                && !found.judged.iter().any(|judged| is_of(judged, [a, b]))
                 // Two effects that share a name cannot be in one model.
                 && let Ok(fit) = self.with_pair(&found.base, [a, b], pair.amplitudes)
             {
                 fits.push(fit);
             }
         }
-        self.cache.stage("screen", "effects at finite amplitudes, since no effect explains the gap alone");
-        let wanted = found.base.cost() - threshold;
-        let finite = self.finite_fits(found, wanted)?;
+        let finite = self.finite_or_none(found, threshold)?;
         let n = fits.len() + finite.len();
         self.cache.stage("refit", &format!("{n} pairs, since no effect explains the gap alone"));
         let mut first = self.first_of(fits)?;
@@ -89,6 +89,19 @@ impl<'c> Searcher<'_, '_, 'c> {
         fits.extend(self.members_alone(found, &fits)?);
         let fits = self.none_above_its_parts(found, fits)?;
         self.judge_all(found, fits)
+    }
+
+    /// Fits at finite amplitudes, which no term without a name of its own needs.
+    fn finite_or_none(
+        &mut self,
+        found: &SearchResult<'c>,
+        threshold: f64,
+    ) -> Result<Vec<FittedVariant<'c>>, ExplainError> {
+        if self.tried.contains(&Kind::Generic) && !self.asked {
+            return Ok(Vec::new());
+        }
+        self.cache.stage("screen", "effects at finite amplitudes, since no effect explains the gap alone");
+        self.finite_fits(found, found.base.cost() - threshold)
     }
 
     /// Those of these fits that promise most after their first rounds. Without a run, for it failed or the budget ended before it, there
@@ -140,9 +153,8 @@ impl<'c> Searcher<'_, '_, 'c> {
         let optimum = found.base.optimum()?;
         let kind = |h: &ScreeningResult| self.candidates[h.candidate].kind;
         let all = found.passing().is_empty();
-        let is_usable = |h: &&ScreeningResult| {
-            h.failure.is_none() && !h.is_imitated() && (all || kind(h) != Kind::Instrument)
-        };
+        let is_tried = |kind: Kind| self.tried.contains(&kind) && (all || kind != Kind::Instrument);
+        let is_usable = |h: &&ScreeningResult| h.failure.is_none() && !h.is_imitated() && is_tried(kind(h));
         let usable = found.screening.iter().filter(is_usable);
         let mut best = largest_of_each(usable, |h| h.score.gain);
         best.truncate(self.cache.series_held().max(2));
@@ -159,6 +171,13 @@ impl<'c> Searcher<'_, '_, 'c> {
         }
         Ok(members)
     }
+}
+
+/// Whether a variant is that of these two effects.
+fn is_of(judged: &JudgedFit<'_>, members: [&Member; 2]) -> bool {
+    let effects = &judged.fit.variant.effects;
+    effects.len() == 2
+        && members.iter().all(|member| effects.iter().any(|effect| effect.index == member.result.candidate))
 }
 
 /// The pairs with the largest gain, each of whose members adds its share, one for every two candidates.

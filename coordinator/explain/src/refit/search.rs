@@ -42,7 +42,7 @@ pub(super) struct Searcher<'s, 'l, 'c> {
 
 /// Kinds that are tried first, and those that are where effects are asked for by name.
 const FIRST: &[Kind] = &[Kind::Study, Kind::Library, Kind::Instrument];
-const ASKED: &[Kind] = &[Kind::Study, Kind::Library, Kind::Generic, Kind::Instrument];
+pub(super) const ASKED: &[Kind] = &[Kind::Study, Kind::Library, Kind::Generic, Kind::Instrument];
 
 /// The kinds that a search tries first.
 pub(crate) fn first_kinds(options: &Options) -> &'static [Kind] {
@@ -88,6 +88,7 @@ pub(crate) fn search<'c>(
         let best = searcher.best_of_each(&found.screening);
         searcher.cache.foreseen.goes(Course::Refit);
         searcher.refit_singles(&mut found, &best)?;
+        searcher.refit_near_priors(&mut found)?;
         searcher.cache.foreseen.goes(Course::Open);
         searcher.replace_terms(&mut found)?;
         searcher.second_pass(&mut found, options)?;
@@ -98,34 +99,6 @@ pub(crate) fn search<'c>(
     }
     found.cut_short = searcher.cut_short || searcher.cache.was_cut_short();
     Ok(found)
-}
-
-/// Goes on with candidates of one more kind, one at a time, where none of those before explains the gap. Whether there is any.
-///
-/// # Errors
-/// As [`search`].
-pub(crate) fn search_further<'c>(
-    cache: &mut RunCache<'_>,
-    found: &mut SearchResult<'c>,
-    candidates: &'c [Candidate],
-    tracks: &[Track],
-    options: &Options,
-    tried: &'static [Kind],
-) -> Result<bool, ExplainError> {
-    let mut of_kind = candidates.iter().filter(|c| tried.contains(&c.kind));
-    let Some(kind) = of_kind.next().map(|c| c.kind).filter(|_| options.only.is_empty()) else {
-        return Ok(false);
-    };
-    let mut searcher = Searcher { cache, candidates, tracks, cut_short: false, asked: false, tried };
-    searcher.cache.foreseen.goes(Course::Open);
-    searcher.cache.stage("screen", &format!("{}, since no other effect explains the gap", kind.plural()));
-    let screening = searcher.screen_all(&found.base)?;
-    let best = searcher.best_of_each(&screening);
-    searcher.widen(found, screening)?;
-    searcher.refit_singles(found, &best)?;
-    searcher.second_pass(found, &Options { max_effects: 1, ..options.clone() })?;
-    found.cut_short |= searcher.cut_short || searcher.cache.was_cut_short();
-    Ok(true)
 }
 
 /// Largest fall of χ² in a screening, to first order, with an amplitude of a sign that physics allows.
@@ -147,7 +120,10 @@ fn null_distribution(
 }
 
 impl<'c> Searcher<'_, '_, 'c> {
-    fn screen_all(&mut self, fit: &FittedVariant<'c>) -> Result<Vec<ScreeningResult>, ExplainError> {
+    pub(super) fn screen_all(
+        &mut self,
+        fit: &FittedVariant<'c>,
+    ) -> Result<Vec<ScreeningResult>, ExplainError> {
         let of: Vec<(usize, usize)> = self
             .candidates
             .iter()
@@ -204,7 +180,7 @@ impl<'c> Searcher<'_, '_, 'c> {
 
     /// Refits the best of these candidates, one effect each, and goes on down the list while none of them passes the gates and the next still
     /// gains more than chance.
-    fn refit_singles(
+    pub(super) fn refit_singles(
         &mut self,
         found: &mut SearchResult<'c>,
         best: &[ScreeningResult],

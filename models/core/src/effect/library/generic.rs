@@ -12,7 +12,7 @@ use crate::{EffectDef, Quantity, Role};
 
 /// Every effect of this family.
 pub(super) const GROWERS: &[Grow] =
-    &[source, loss, growth, self_limit, coupling, interaction, saturation, threshold];
+    &[source, loss, growth, self_limit, coupling, interaction, saturation, threshold, hidden_store];
 
 /// Scalar states beyond which a model has too many pairs of quantities to try them all.
 const MOST_STATES: usize = 8;
@@ -156,4 +156,38 @@ fn threshold(host: Host<'_>) -> Vec<EffectDef> {
             .confounders(&["self-limit", "loss"])
             .source("Quandt 1958, J. Am. Statist. Assoc. 53, 873")
     })
+}
+
+/// An exchange with something that no output shows. A temperature has one with a name of its own.
+fn hidden_store(host: Host<'_>) -> Vec<EffectDef> {
+    let mut hosts = rates(host);
+    hosts.retain(|q| q.role != Role::Temperature);
+    host.each(hosts)
+        .iter()
+        .map(|(place, x)| {
+            let (k, hidden) = (place.name("k_hidden"), place.name("hidden"));
+            let (ratio, start) = (place.name("ratio_hidden"), place.name("hidden_start"));
+            let says = format!("A hidden store takes {} up and gives it back.", x.name);
+            Draft::new(place, "hidden-store", says)
+                .adds(&x.name, format!("-{k}*({} - {hidden})", x.name))
+                .coefficient(&k, per_time("", host.time), POSITIVE, "Rate of exchange.")
+                .inner(
+                    &ratio,
+                    "",
+                    ([0.01, 20.0], &[0.2, 1.0]),
+                    Scale::Absolute,
+                    "What the quantity holds over what the store holds at the same value.",
+                )
+                .inner(
+                    &start,
+                    &x.unit,
+                    ([-1.0, 2.0], &[0.0, 1.0]),
+                    Scale::Range(x.name.clone()),
+                    "Value of the store at the start.",
+                )
+                .state(&hidden, &x.unit, start.clone(), format!("{k}*{ratio}*({} - {hidden})", x.name))
+                .confounders(&["threshold", "self-limit", "loss"])
+                .source("Teorell 1937, Arch. Int. Pharmacodyn. Ther. 57, 205")
+        })
+        .collect()
 }
