@@ -15,7 +15,7 @@ use crate::run_cache::{Course, RunCache};
 /// gap. Whether there is any.
 ///
 /// # Errors
-/// As [`search`].
+/// As [`super::search::search`].
 pub(crate) fn search_further<'c>(
     cache: &mut RunCache<'_>,
     found: &mut SearchResult<'c>,
@@ -30,7 +30,12 @@ pub(crate) fn search_further<'c>(
     };
     let mut searcher = Searcher { cache, candidates, tracks, cut_short: false, asked: false, tried };
     searcher.cache.foreseen.goes(Course::Open);
-    searcher.cache.stage("screen", &format!("{}, since no other effect explains the gap", kind.plural()));
+    let since = if wanted > 0.0 {
+        "what explains the gap leaves more than noise"
+    } else {
+        "no other effect explains the gap"
+    };
+    searcher.cache.stage("screen", &format!("{}, since {since}", kind.plural()));
     let screening = searcher.screen_all(&found.base)?;
     let mut best = searcher.best_of_each(&screening);
     best.retain(|h| h.score.gain > wanted);
@@ -50,7 +55,7 @@ pub(crate) fn search_further<'c>(
 /// Goes on with pairs that have a generic term, where nothing else explains the gap.
 ///
 /// # Errors
-/// As [`search`].
+/// As [`super::search::search`].
 pub(crate) fn search_generic_pairs<'c>(
     cache: &mut RunCache<'_>,
     found: &mut SearchResult<'c>,

@@ -82,7 +82,7 @@ fn check_mean(
         Transform::Linear => return,
         Transform::Log => sd,
         Transform::Log2 => sd.map(|sd| sd * std::f64::consts::LN_2),
-        _ => None,
+        Transform::Logit { .. } => None,
     };
     let help = of_logarithm.map_or_else(
         || "write `median`: the value that lies in the middle of the probability".to_owned(),
