@@ -38,6 +38,8 @@ const LEFT_AFTER: Duration = Duration::from_millis(2);
 const LAST_WORDS: Duration = Duration::from_secs(5);
 /// The same of one that only broke the protocol and need not end.
 const SHORT: Duration = Duration::from_millis(500);
+/// How long a program may take from its answer to the end of the call.
+const CLOSING: Duration = Duration::from_secs(1);
 
 /// Why a program is of no more use.
 #[derive(Debug)]
@@ -156,7 +158,7 @@ impl Instance {
                 match replies.message().await {
                     Ok(Some(reply)) => match decode_reply(reply).map_err(|e| Broken::Protocol(plain(e)))? {
                         Reply::Progress(time) => tracing::debug!(particle = run.particle, time, "progress"),
-                        Reply::Ended(answer) => return Ok(answer.map_err(answer::reported)),
+                        Reply::Ended(answer) => return Ok((answer.map_err(answer::reported), replies)),
                     },
                     Ok(None) => {
                         return Err(Broken::Protocol("it ended the run without an answer".to_owned()));
@@ -167,7 +169,10 @@ impl Instance {
         };
         let process = self.process.as_ref();
         match self.runtime.block_on(within(patience, run.stop, process, conversation)) {
-            Ok(Ok(answer)) => {
+            Ok(Ok((answer, mut rest))) => {
+                // A call that is left before its end counts against the connection, which takes a thousand of them.
+                let end = async { while let Ok(Some(_)) = rest.message().await {} };
+                let _ = self.runtime.block_on(async { tokio::time::timeout(CLOSING, end).await });
                 Ok(answer.and_then(|solved| self.sound(run, solved)).map_err(|e| self.named(e)))
             }
             Ok(Err(broken)) => Err(self.lost(broken)),

@@ -9,6 +9,7 @@ mod processes;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Duration;
 
 use kit::{Bad, Reaction, finished, job, quantity, reaching, setup, sound, soundly};
 use starlings_models::{ModelFailure, ParticleError};
@@ -60,6 +61,27 @@ fn an_answer_of_another_shape_or_without_finite_values_is_told_with_the_solver_a
         let says = failure_of(move || Reaction::Says(vec![finished(&outputs, &state)])).to_string();
         assert!(says.contains("the solver `") && says.contains(wanted), "`{wanted}` is missing in: {says}");
     }
+}
+
+#[test]
+fn a_call_is_not_left_before_its_end_however_much_later_than_the_answer_that_comes() {
+    // A connection breaks after a thousand calls that were.
+    let linger = Duration::from_millis(20);
+    let bad = Bad::new(sound(), move |_| Reaction::Lingers(vec![finished(&[0.0; 6], &[0.0; 2])], linger));
+    let (solvers, def) = bad.reached();
+    let forward = solvers.build(&setup(&solvers, &def)).unwrap();
+    assert!((0..5).all(|_| forward.run(&job(None)).is_ok()));
+    std::thread::sleep(2 * linger);
+    assert_eq!(bad.left(), 0);
+}
+
+#[test]
+fn an_answer_whose_stream_never_ends_is_an_answer() {
+    let linger = Duration::from_secs(1000);
+    let bad = Bad::new(sound(), move |_| Reaction::Lingers(vec![finished(&[0.0; 6], &[0.0; 2])], linger));
+    let (solvers, def) = bad.reached();
+    let forward = solvers.build(&setup(&solvers, &def)).unwrap();
+    assert!((0..2).all(|_| forward.run(&job(None)).is_ok()));
 }
 
 #[test]

@@ -4,6 +4,8 @@
 
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Duration;
 
 use starlings_models::{Job, ModelDef, SOLVER, Setup, SolverDef, Window};
 use starlings_proto::convert::floats;
@@ -15,13 +17,16 @@ use starlings_proto::generated_solver::{
 };
 use starlings_solver::{SiteOptions, Solvers};
 use tokio::net::UnixListener;
-use tokio_stream::wrappers::UnixListenerStream;
+use tokio::sync::mpsc;
+use tokio_stream::wrappers::{ReceiverStream, UnixListenerStream};
 use tonic::{Request, Response, Status};
 
 /// What a solver does when it is asked for a run.
 pub(crate) enum Reaction {
     /// It sends these messages and ends the stream.
     Says(Vec<RunReply>),
+    /// It sends these messages, and ends the stream so much later.
+    Lingers(Vec<RunReply>, Duration),
     /// It ends the stream with an error of the call.
     Refuses(Status),
     /// It never answers.
@@ -33,30 +38,41 @@ pub(crate) enum Reaction {
 type React = Arc<dyn Fn(&RunRequest) -> Reaction + Send + Sync>;
 
 /// A solver in a thread of this process.
-pub(crate) struct Bad(tempfile::TempDir);
+pub(crate) struct Bad {
+    folder: tempfile::TempDir,
+    left: Arc<AtomicUsize>,
+}
 
 impl Bad {
     pub(crate) fn new(
         described: Description,
         react: impl Fn(&RunRequest) -> Reaction + Send + Sync + 'static,
     ) -> Self {
-        Self::start(Service { described: Some(described), react: Arc::new(react) })
+        Self::start(Service { react: Arc::new(react), ..Service::new(Some(described)) })
     }
 
     /// One that does not even say what it is.
     pub(crate) fn mute() -> Self {
-        Self::start(Service { described: None, react: Arc::new(|_| Reaction::Never) })
+        Self::start(Service::new(None))
     }
 
     fn start(service: Service) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let socket = folder.path().join("s");
+        let left = Arc::clone(&service.left);
         std::thread::spawn(move || service.serve(&socket));
-        Self(folder)
+        Self { folder, left }
     }
 
     pub(crate) fn reached(&self) -> (Solvers, SolverDef) {
-        (Solvers::new(SiteOptions::default()), reaching(&self.0.path().join("s")))
+        (Solvers::new(SiteOptions::default()), reaching(&self.folder.path().join("s")))
+    }
+}
+
+impl Bad {
+    /// Calls that were left before their end.
+    pub(crate) fn left(&self) -> usize {
+        self.left.load(Ordering::Relaxed)
     }
 }
 
@@ -69,9 +85,16 @@ pub(crate) fn reaching(socket: &Path) -> SolverDef {
 pub(crate) struct Service {
     pub(crate) described: Option<Description>,
     pub(crate) react: React,
+    /// Calls that were left before their end.
+    pub(crate) left: Arc<AtomicUsize>,
 }
 
 impl Service {
+    /// One that never answers a run.
+    pub(crate) fn new(described: Option<Description>) -> Self {
+        Self { described, react: Arc::new(|_| Reaction::Never), left: Arc::default() }
+    }
+
     /// Serves on this socket until the process ends.
     pub(crate) fn serve(self, socket: &Path) {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
@@ -80,6 +103,27 @@ impl Service {
             let server = tonic::transport::Server::builder().add_service(SolverServer::new(self));
             server.serve_with_incoming(incoming).await.unwrap();
         });
+    }
+}
+
+impl Service {
+    /// A stream of these messages that ends so much later.
+    fn stream(
+        &self,
+        messages: impl IntoIterator<Item = Result<RunReply, Status>>,
+        later: Duration,
+    ) -> Response<ReceiverStream<Result<RunReply, Status>>> {
+        let messages: Vec<_> = messages.into_iter().collect();
+        let (sender, receiver) = mpsc::channel(messages.len().max(1));
+        for message in messages {
+            sender.try_send(message).unwrap();
+        }
+        let left = Arc::clone(&self.left);
+        tokio::spawn(async move {
+            tokio::time::sleep(later).await;
+            left.fetch_add(usize::from(sender.is_closed()), Ordering::Relaxed);
+        });
+        Response::new(ReceiverStream::new(receiver))
     }
 }
 
@@ -92,15 +136,13 @@ impl Solver for Service {
         }
     }
 
-    type RunStream = tokio_stream::Iter<std::vec::IntoIter<Result<RunReply, Status>>>;
+    type RunStream = ReceiverStream<Result<RunReply, Status>>;
 
     async fn run(&self, request: Request<RunRequest>) -> Result<Response<Self::RunStream>, Status> {
         match (self.react)(request.get_ref()) {
-            Reaction::Says(replies) => {
-                let replies: Vec<_> = replies.into_iter().map(Ok).collect();
-                Ok(Response::new(tokio_stream::iter(replies)))
-            }
-            Reaction::Refuses(status) => Ok(Response::new(tokio_stream::iter(vec![Err(status)]))),
+            Reaction::Says(replies) => Ok(self.stream(replies.into_iter().map(Ok), Duration::ZERO)),
+            Reaction::Lingers(replies, time) => Ok(self.stream(replies.into_iter().map(Ok), time)),
+            Reaction::Refuses(status) => Ok(self.stream([Err(status)], Duration::ZERO)),
             Reaction::Never => std::future::pending().await,
             Reaction::Panics => panic!("a solver that panics"),
         }

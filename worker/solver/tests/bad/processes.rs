@@ -55,7 +55,7 @@ fn misbehaving() {
             std::process::exit(3)
         }
     };
-    Service { described: Some(sound()), react: Arc::new(react) }.serve(Path::new(&socket));
+    Service { react: Arc::new(react), ..Service::new(Some(sound())) }.serve(Path::new(&socket));
 }
 
 /// A folder for one test and the solver that misbehaves in it.
