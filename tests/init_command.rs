@@ -49,7 +49,10 @@ fn rows(n: usize, row: impl Fn(usize, f64, f64) -> String) -> String {
 fn a_clean_table_is_kept_byte_by_byte_and_its_units_are_found() {
     let table = "time (min),power [W],T_degC\n".to_owned() + &rows(40, |k, p, v| format!("{k},{p},{v:.3}"));
     let folder = folder("tank.csv", &table);
-    let (study, _) = drafted(folder.path(), &["tank.csv", "--input", "power"]);
+    let (study, notes) = drafted(folder.path(), &["tank.csv", "--input", "power"]);
+    assert!(!notes.contains("--input"), "{notes}");
+    let (_, notes) = drafted(folder.path(), &["tank.csv", "--out", "unasked"]);
+    assert!(notes.contains("`power [W]` switches") && notes.contains("write --input power"), "{notes}");
     assert_eq!(std::fs::read_to_string(folder.path().join("tank/tank.csv")).unwrap(), table);
     for line in [
         "time_unit = \"min\"",
@@ -164,24 +167,6 @@ fn a_column_that_numbers_the_rows_is_neither_measured_nor_the_time_where_there_i
     let table = ",T\n".to_owned() + &rows(30, |k, _, v| format!("{k},{v:.3}"));
     let (study, _) = drafted(folder("c.csv", table).path(), &["c.csv"]);
     assert!(study.contains("output = \"T\""), "{study}");
-}
-
-#[test]
-fn a_column_that_switches_is_told_to_look_like_an_input() {
-    let table = "time (min),power [W],T_degC\n".to_owned() + &rows(40, |k, p, v| format!("{k},{p},{v:.3}"));
-    let switching = folder("tank.csv", &table);
-    let (study, notes) = drafted(switching.path(), &["tank.csv"]);
-    assert!(study.contains("level_power"), "{study}");
-    assert!(
-        notes.contains("`power [W]` switches between a few values") && notes.contains("write --input power"),
-        "{notes}"
-    );
-    let (_, notes) = drafted(switching.path(), &["tank.csv", "--input", "power", "--out", "driven"]);
-    assert!(!notes.contains("--input"), "{notes}");
-    let table = "t,a,b\n".to_owned() + &rows(40, |k, _, v| format!("{k},{v:.3},{:.3}", 2.0 * v));
-    let smooth = folder("two.csv", table);
-    let (_, notes) = drafted(smooth.path(), &["two.csv"]);
-    assert!(notes.contains("every column was taken for an output; --input COLUMN names"), "{notes}");
 }
 
 #[test]

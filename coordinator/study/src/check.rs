@@ -12,6 +12,7 @@ mod infer;
 mod initial;
 mod limits;
 mod load;
+mod median;
 mod model;
 mod nudged;
 mod observer;

@@ -143,15 +143,20 @@ pub(super) struct ParameterSection {
 pub(super) struct PriorSection {
     pub(super) span: Range<usize>,
     pub(super) transform: Option<Spanned<String>>,
-    /// The median, or the mean in its place.
     pub(super) median: Option<Spanned<f64>>,
-    /// Of a Gaussian the median by its other name.
     pub(super) mean: Option<Spanned<f64>>,
     pub(super) median_from: Option<Spanned<String>>,
     pub(super) factor: Option<Spanned<f64>>,
     pub(super) sd: Option<Spanned<f64>>,
     pub(super) lo: Option<Spanned<f64>>,
     pub(super) hi: Option<Spanned<f64>>,
+}
+
+impl PriorSection {
+    /// Its median, which of a Gaussian may be called its mean.
+    pub(super) fn middle(&self) -> Option<&Spanned<f64>> {
+        self.median.as_ref().or(self.mean.as_ref())
+    }
 }
 
 /// `process = { ... }`.

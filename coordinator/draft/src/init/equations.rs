@@ -206,3 +206,36 @@ fn mean(values: &[f64]) -> f64 {
 fn ratio(above: &str, below: &str) -> String {
     if above.is_empty() || below.is_empty() { String::new() } else { format!("({above})/({below})") }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_stays_at_one_of_a_few_values_and_jumps_switches() {
+        let of = |value: fn(usize) -> f64| switches(&(0..40).map(value).collect::<Vec<_>>());
+        assert!(of(|k| if k / 8 % 2 == 0 { 5.0 } else { 0.0 }));
+        assert!(!of(|k| k as f64) && !of(|_| 5.0));
+        // A sensor that counts coarsely scatters between its counts.
+        assert!(!of(|k| if k % 3 == 0 { 20.5 } else { 20.0 }));
+    }
+
+    #[test]
+    fn only_what_looks_like_an_input_beside_an_output_is_named() {
+        let column = |name: &str, value: fn(usize) -> f64| Column {
+            heading: name.to_owned(),
+            name: name.to_owned(),
+            unit: String::new(),
+            values: (0..40).map(value).collect(),
+        };
+        let jumps = |k: usize| if k < 20 { 1.0 } else { 2.0 };
+        let (fan, heater) = (column("fan", jumps), column("heater", jumps));
+        let air = column("air", |k| (k * k) as f64);
+        let all = "every column was taken for an output; --input COLUMN names what drives the system";
+        assert_eq!(unasked(&[air.clone(), air.clone()]), all);
+        assert_eq!(unasked(&[fan.clone(), heater.clone()]), all);
+        let both = unasked(&[fan, air, heater]);
+        assert!(both.starts_with("`fan`, `heater` switch between"), "{both}");
+        assert!(both.ends_with("if they do drive it, write --input fan --input heater"), "{both}");
+    }
+}

@@ -104,6 +104,12 @@ impl<'c> ModelVariant<'c> {
         &self.unit
     }
 
+    /// Whether its effects are those of these candidates, in any order.
+    pub(crate) fn has_just(&self, candidates: &[usize]) -> bool {
+        self.effects.len() == candidates.len()
+            && candidates.iter().all(|index| self.effects.iter().any(|effect| effect.index == *index))
+    }
+
     /// Number of estimated values.
     pub(crate) fn n_param(&self) -> usize {
         self.study.theta.len()

@@ -78,10 +78,7 @@ impl<'c> Searcher<'_, '_, 'c> {
 /// Whether two fits are of the same single effect.
 fn is_same(one: &FittedVariant<'_>, other: &FittedVariant<'_>) -> bool {
     let [a, b] = [&one.variant, &other.variant];
-    a.left_out == b.left_out
-        && a.effects.len() == 1
-        && b.effects.len() == 1
-        && a.effects[0].index == b.effects[0].index
+    a.left_out == b.left_out && a.effects.len() == 1 && b.has_just(&[a.effects[0].index])
 }
 
 /// Whether a fit of the same effect ended as low.

@@ -15,7 +15,6 @@ use crate::fit::kind::Kind;
 use crate::fit::model_variant::{AddedEffect, ModelVariant};
 use crate::judge::contribution::SECOND_SHARE;
 use crate::judge::effective_noise::inflation;
-use crate::judge::gates::JudgedFit;
 use crate::judge::search_result::SearchResult;
 use crate::judge::verdict::ALIKE;
 use crate::run_cache::Course;
@@ -70,7 +69,7 @@ impl<'c> Searcher<'_, '_, 'c> {
             let left = optimum.residual() - taken;
             let noise = inflation(&self.cache.rows, &left.rows(0, self.cache.rows.train.len()).into_owned());
             if pair.gain > noise * threshold
-                && !found.judged.iter().any(|judged| is_of(judged, [a, b]))
+                && !found.judged.iter().any(|j| j.fit.variant.has_just(&[a, b].map(|of| of.result.candidate)))
                 // Two effects that share a name cannot be in one model.
                 && let Ok(fit) = self.with_pair(&found.base, [a, b], pair.amplitudes)
             {
@@ -171,13 +170,6 @@ impl<'c> Searcher<'_, '_, 'c> {
         }
         Ok(members)
     }
-}
-
-/// Whether a variant is that of these two effects.
-fn is_of(judged: &JudgedFit<'_>, members: [&Member; 2]) -> bool {
-    let effects = &judged.fit.variant.effects;
-    effects.len() == 2
-        && members.iter().all(|member| effects.iter().any(|effect| effect.index == member.result.candidate))
 }
 
 /// The pairs with the largest gain, each of whose members adds its share, one for every two candidates.

@@ -17,23 +17,24 @@ impl<'c> Searcher<'_, '_, 'c> {
             return Ok(());
         };
         let [a, b] = pair.variant.effects.as_slice() else { return Ok(()) };
-        let mut begun = Vec::new();
-        for (stays, goes) in [(a, b), (b, a)].into_iter().filter(|(_, goes)| goes.candidate.n_inner() > 0) {
-            for simple in self.simple_in_place_of(found, goes) {
-                let known = found.judged.iter().map(|j| &j.fit.variant.effects);
-                let is_pair = |of: &Vec<AddedEffect<'_>>| {
-                    of.len() == 2 && of.iter().all(|e| [stays.index, simple.index].contains(&e.index))
-                };
-                if simple.index != stays.index && !known.into_iter().any(is_pair) {
-                    let effects = vec![stays.clone(), simple];
-                    // Two effects that share a name cannot be in one model.
-                    let of = &pair.variant;
-                    let Ok(variant) = ModelVariant::new(of.base, effects, &of.left_out) else { continue };
-                    let start = variant.continue_from(of, pair.z(), &[]);
-                    begun.push(FittedVariant::begin(variant, start));
-                }
-            }
-        }
+        let of = &pair.variant;
+        let elaborate = [(a, b), (b, a)].into_iter().filter(|(_, goes)| goes.candidate.n_inner() > 0);
+        let pairs = elaborate.flat_map(|(stays, goes)| {
+            self.simple_in_place_of(found, goes).into_iter().map(move |new| [stays.clone(), new])
+        });
+        let is_new = |[stays, new]: &[AddedEffect<'c>; 2]| {
+            let known = found.judged.iter().any(|j| j.fit.variant.has_just(&[stays.index, new.index]));
+            stays.index != new.index && !known
+        };
+        // Two effects that share a name cannot be in one model.
+        let variants = pairs
+            .filter(is_new)
+            .filter_map(|pair| ModelVariant::new(of.base, pair.to_vec(), &of.left_out).ok());
+        let begin = |variant: ModelVariant<'c>| {
+            let start = variant.continue_from(of, pair.z(), &[]);
+            FittedVariant::begin(variant, start)
+        };
+        let begun: Vec<_> = variants.map(begin).collect();
         self.cache.stage("refit", &format!("{} simpler pairs", begun.len()));
         let first = self.first_of(begun)?;
         let fits = self.refit(first)?;

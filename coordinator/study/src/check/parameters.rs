@@ -6,6 +6,7 @@ use starlings_models::{Spec, quoted_list};
 use toml::Spanned;
 
 use super::built::{CheckedModel, quantity, valid_names};
+use super::median::check_median;
 use super::prior::{self, Prior};
 use crate::checked::{Record, StudyParameter};
 use crate::expand::INITIAL;
@@ -69,7 +70,7 @@ pub(crate) fn initial_medians(
         }
         let mean = |record: &Record| match (&section.prior.median_from, prior.mean) {
             (Some(from), _) => first_value(source, from, record)
-                .filter(|median| prior::check_median(source, median, name, &prior.transform, quantity))
+                .filter(|median| check_median(source, median, name, &prior.transform, quantity))
                 .map_or(f64::NAN, |median| prior.transform.to_transformed(*median.get_ref())),
             (None, mean) => mean.unwrap_or(f64::NAN),
         };

@@ -7,6 +7,7 @@ use starlings_estimators::{Drift, Transform};
 use starlings_models::Quantity;
 use toml::Spanned;
 
+use super::median::{check_mean, check_median};
 use crate::file::{ParameterSection, PriorSection, ProcessSection};
 use crate::problem::Source;
 
@@ -38,7 +39,7 @@ pub(crate) fn prior(
     if let (Some(t), Some(q)) = (transform, quantity) {
         check_bounds(source, written, &t, q);
     }
-    let mean = match (&written.median, &written.median_from) {
+    let mean = match (written.middle(), &written.median_from) {
         (Some(median), None) => transform.and_then(|t| {
             check_median(source, median, parameter.name.get_ref(), &t, quantity)
                 .then(|| t.to_transformed(*median.get_ref()))
@@ -63,75 +64,6 @@ pub(crate) fn prior(
     };
     let drift = drift(source, &parameter.process);
     (source.count() == before).then_some(Prior { transform: transform?, mean, sd: sd?, drift })
-}
-
-/// Refuses a mean where it is not the median, or stands beside one.
-fn check_mean(
-    source: &Source,
-    prior: &PriorSection,
-    mean: &Spanned<f64>,
-    transform: &Transform,
-    sd: Option<f64>,
-) {
-    if prior.median.as_ref().is_some_and(|median| median.span() != mean.span()) {
-        source.report_with(mean.span(), "`median` and `mean` exclude each other", "keep one of them");
-        return;
-    }
-    // Of a log-normal, E x = median exp(sd²/2), with sd of the natural logarithm (Johnson, Kotz & Balakrishnan 1994, ch. 14).
-    let of_logarithm = match transform {
-        Transform::Linear => return,
-        Transform::Log => sd,
-        Transform::Log2 => sd.map(|sd| sd * std::f64::consts::LN_2),
-        Transform::Logit { .. } => None,
-    };
-    let help = of_logarithm.map_or_else(
-        || "write `median`: the value that lies in the middle of the probability".to_owned(),
-        |sd| {
-            let median = starlings_models::units::rounded(mean.get_ref() * (-0.5 * sd * sd).exp(), 3);
-            format!(
-                "write `median`; with this spread the mean is {} where the median is {median}",
-                mean.get_ref()
-            )
-        },
-    );
-    let message =
-        format!("a prior with the transform {} has a median, which is not its mean", transform.name());
-    source.report_with(mean.span(), message, help);
-}
-
-/// Whether a median can be transformed and lies in the range of its quantity; otherwise it is reported.
-pub(crate) fn check_median(
-    source: &Source,
-    median: &Spanned<f64>,
-    name: &str,
-    transform: &Transform,
-    quantity: Option<&Quantity>,
-) -> bool {
-    let value = *median.get_ref();
-    if !transform.contains(value) {
-        let (message, help) = match transform {
-            Transform::Logit { lo, hi } => (
-                format!("the prior median {value} of `{name}` must lie between {lo} and {hi}"),
-                "move the median or the bounds of the logit",
-            ),
-            _ => (
-                format!(
-                    "the prior median {value} of `{name}` must be above zero for a {} transform",
-                    transform.name()
-                ),
-                "use transform = \"linear\" with `sd` for a value that may be zero or negative",
-            ),
-        };
-        source.report_with(median.span(), message, help);
-        return false;
-    }
-    if let Some(q) = quantity.filter(|q| value < q.range[0] || value > q.range[1]) {
-        let message =
-            format!("the prior median {value} of `{name}` is outside the model's range ({})", q.range_text());
-        source.report_with(median.span(), message, "give a median that physics allows");
-        return false;
-    }
-    true
 }
 
 /// The transform as written: a name, or `logit(lo, hi)`.

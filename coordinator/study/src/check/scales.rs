@@ -209,7 +209,7 @@ fn elsewhere(file: &StudyFile, written: &EffectParameter, found: &EffectParamete
     let name = &written.name;
     let constant = file.model.constants.iter().find(|(n, _)| n.get_ref() == name).map(|(_, v)| *v.get_ref());
     let median = file.parameters.iter().find(|p| p.name.get_ref() == name);
-    let (what, value) = match (constant, median.and_then(|p| p.prior.median.as_ref())) {
+    let (what, value) = match (constant, median.and_then(|p| p.prior.middle())) {
         (Some(value), _) => ("constant", value),
         (None, Some(median)) => ("the prior median of", *median.get_ref()),
         (None, None) => return None,

@@ -108,7 +108,7 @@ fn prior(parameter: &Table<'_>) -> PriorSection {
     PriorSection {
         span: t.span.clone(),
         transform: t.text("transform"),
-        median: t.number("median").or_else(|| t.number("mean")),
+        median: t.number("median"),
         mean: t.number("mean"),
         median_from: t.text("median_from"),
         factor: t.number("factor"),
