@@ -6,7 +6,7 @@ mod study_kit;
 
 use explained_kit::{explained, noisy};
 use starlings_coordinator::explain::Explanation;
-use study_kit::{Case, csv, grid};
+use study_kit::{Case, csv, grid, normals};
 
 /// Names of what is told.
 fn told(found: &Explanation) -> Vec<&str> {
@@ -158,13 +158,18 @@ time_unit = "s"
 [model]
 kind = "equations"
 outputs = [ { name = "speed", unit = "m/s", value = "v" } ]
-inputs = [ { name = "thrust", unit = "m/s^2" }, { name = "slope" } ]
+inputs = [ { name = "force", unit = "N" }, { name = "slope" } ]
 
 [[model.states]]
 name = "v"
 unit = "m/s"
-initial = 12.0
-rate = "thrust - c0 - c2*v^2"
+initial = 12
+rate = "force/m - c0 - c2*v^2"
+
+[[parameters]]
+name = "m"
+unit = "kg"
+prior = { transform = "log", median = 1200.0, factor = 1.5 }
 
 [[parameters]]
 name = "c0"
@@ -174,12 +179,17 @@ prior = { transform = "log", median = 0.1, factor = 2.0 }
 [[parameters]]
 name = "c2"
 unit = "1/m"
-prior = { transform = "log", median = 0.0005, factor = 2.0 }
+prior = { transform = "log", median = 0.001, factor = 3.0 }
+
+[[parameters]]
+name = "initial:v"
+unit = "m/s"
+prior = { transform = "linear", median = 12.0, sd = 1.0 }
 
 [[records]]
 name = "road"
 file = "road.csv"
-inputs = { thrust = "thrust", slope = "slope" }
+inputs = { force = "force", slope = "slope" }
 channels = [ { column = "speed", output = "speed", noise = 0.12 } ]
 train = [0.0, 200.0]
 "#;
@@ -197,12 +207,22 @@ parameters = [ { name = "g", unit = "m/s^2", range = [0, 20] } ]
 fn what_leaves_more_than_noise_is_not_named_before_a_dependence_was_tried() {
     let times = grid(301, 1.0);
     let wave = |period: f64, phase: f64| move |t: &f64| (std::f64::consts::TAU * t / period + phase).sin();
-    let thrust: Vec<f64> = times.iter().map(|t| 0.5 + 0.4 * wave(120.0, 0.0)(t)).collect();
+    let pull = |t: &f64| 900.0 + 500.0 * wave(120.0, 0.0)(t) + 300.0 * wave(61.0, 0.0)(t).signum();
+    let force: Vec<f64> = times.iter().map(|t| pull(t).max(0.0)).collect();
     let slope: Vec<f64> =
-        times.iter().map(|t| 0.03 * wave(83.0, 0.0)(t) + 0.015 * wave(37.0, 1.0)(t)).collect();
-    let recording = |speed: &[f64]| csv("time,thrust,slope,speed", &[&times, &thrust, &slope, speed]);
+        times.iter().map(|t| 0.03 * wave(83.0, 0.0)(t) + 0.02 * wave(37.0, 1.0)(t)).collect();
+    let recording = |speed: &[f64]| csv("time,force,slope,speed", &[&times, &force, &slope, speed]);
     let truth = Case::new(&format!("{CAR}{WEIGHT}"), &[("road.csv", recording(&vec![12.0; times.len()]))]);
-    let speed = noisy(&truth, &[("c0", 0.12), ("c2", 0.0006)], ("weight", 9.81), "speed", 0.12);
+    let clean =
+        noisy(&truth, &[("m", 1400.0), ("c0", 0.118), ("c2", 0.00042)], ("weight", 9.81), "speed", 0.0);
+    // AR(1) of 0.5, on a display of tenths.
+    let mut error = 0.0;
+    let speed: Vec<f64> = std::iter::zip(clean, normals(times.len(), 5))
+        .map(|(v, e)| {
+            error = 0.5 * error + 0.12 * 0.75_f64.sqrt() * e;
+            (10.0 * (v + error)).round() / 10.0
+        })
+        .collect();
     let found = explained(&Case::new(CAR, &[("road.csv", recording(&speed))])).unwrap();
     assert_eq!(told(&found), ["coupling:v:slope"], "{}", found.headline);
 }
