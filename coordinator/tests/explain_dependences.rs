@@ -4,9 +4,9 @@
 mod explained_kit;
 mod study_kit;
 
-use explained_kit::{explained, noisy};
+use explained_kit::{displayed, explained, noisy};
 use starlings_coordinator::explain::Explanation;
-use study_kit::{Case, csv, grid, normals};
+use study_kit::{Case, csv, grid};
 
 /// Names of what is told.
 fn told(found: &Explanation) -> Vec<&str> {
@@ -215,14 +215,7 @@ fn what_leaves_more_than_noise_is_not_named_before_a_dependence_was_tried() {
     let truth = Case::new(&format!("{CAR}{WEIGHT}"), &[("road.csv", recording(&vec![12.0; times.len()]))]);
     let clean =
         noisy(&truth, &[("m", 1400.0), ("c0", 0.118), ("c2", 0.00042)], ("weight", 9.81), "speed", 0.0);
-    // AR(1) of 0.5, on a display of tenths.
-    let mut error = 0.0;
-    let speed: Vec<f64> = std::iter::zip(clean, normals(times.len(), 5))
-        .map(|(v, e)| {
-            error = 0.5 * error + 0.12 * 0.75_f64.sqrt() * e;
-            (10.0 * (v + error)).round() / 10.0
-        })
-        .collect();
+    let speed = displayed(&clean, 0.12, 0.1, 5);
     let found = explained(&Case::new(CAR, &[("road.csv", recording(&speed))])).unwrap();
     assert_eq!(told(&found), ["coupling:v:slope"], "{}", found.headline);
 }

@@ -56,6 +56,15 @@ pub fn chi_squared_tail(value: f64, degrees: f64) -> f64 {
     ChiSquared::new(degrees).map_or(1.0, |chi| chi.sf(value.max(0.0)))
 }
 
+/// The square of Student's t with so many degrees of freedom that is as improbable as this χ² of one: what a fall of χ² must be where the
+/// variance is known from the residuals alone. Infinite without any.
+pub fn squared_t_as_improbable(chi2: f64, degrees: f64) -> f64 {
+    if degrees < 1.0 {
+        return f64::INFINITY;
+    }
+    student(0.5 * chi_squared_tail(chi2, 1.0), Some(degrees)).powi(2)
+}
+
 /// Probability that F is larger.
 pub(crate) fn fisher_tail(value: f64, degrees: f64, left: f64) -> f64 {
     if left > 1e5 {
@@ -67,6 +76,15 @@ pub(crate) fn fisher_tail(value: f64, degrees: f64, left: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_squared_t_is_as_improbable_as_its_chi_squared() {
+        // Fisher and Yates: t of 0.05 is 2.228 with 10 degrees of freedom, 1.960 with infinitely many.
+        assert!((squared_t_as_improbable(Z95.powi(2), 10.0).sqrt() - 2.228).abs() < 5e-4);
+        let large = squared_t_as_improbable(12.0, 1e7);
+        // The first term of the expansion is below 1e-6.
+        assert!((large - 12.0).abs() < 1e-5 && squared_t_as_improbable(12.0, 0.0).is_infinite(), "{large}");
+    }
 
     #[test]
     fn the_interval_of_a_rate_is_that_of_the_tables_and_whole_without_a_trial() {

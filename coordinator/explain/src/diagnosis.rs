@@ -1,14 +1,14 @@
 //! The diagnosis of one set of recordings, measured or simulated: the fit of the model as it is, the search, the verdict.
 //!
 //! The search begins with white noise of the stated size. Where the best supported version shows that the noise is correlated, all
-//! of it is done again in units of that noise.
+//! of it is done again in units of that noise ([`crate::rounds`]).
 //!
 //! Next files to read: [`crate::refit::search`], [`crate::judge::verdict`].
 
 use std::cell::OnceCell;
 
 use nalgebra::DVector;
-use starlings_estimators::{CorrelatedNoise, End};
+use starlings_estimators::End;
 use starlings_study::{Record, Study};
 
 use crate::error::ExplainError;
@@ -17,7 +17,6 @@ use crate::fit::drive::drive;
 use crate::fit::fitted_variant::FittedVariant;
 use crate::fit::kind::Kind;
 use crate::fit::model_variant::ModelVariant;
-use crate::judge::noise_model::{alike, best_supported};
 use crate::judge::search_result::SearchResult;
 use crate::judge::verdict::{Decision, Verdict, decide, limits};
 use crate::locate::{self, Track, UnknownInput};
@@ -25,15 +24,13 @@ use crate::options::Options;
 use crate::refit::further::{search_further, search_generic_pairs};
 use crate::refit::other_forms::{search_other_forms, sole_effect};
 use crate::refit::search::{first_kinds, search};
+use crate::rounds::Rounds;
 use crate::run_cache::{Course, Point, RunCache};
 use crate::screen::candidates::candidates;
 use crate::screen::proposals::{self, Proposals};
 use crate::screen::residual_timing::{change_points, periods};
 use crate::screen::resolve::{kinded, resolved_candidates};
 use crate::tell::words;
-
-/// Searches at most, each in units of the noise that the last one showed.
-const ROUNDS: usize = 3;
 
 /// A search with its verdict.
 pub(super) struct Diagnosis<'a, 'c> {
@@ -56,12 +53,12 @@ pub(super) fn diagnose<R>(
     options: &Options,
     then: impl FnOnce(&mut RunCache<'_>, Diagnosis<'_, '_>) -> Result<R, ExplainError>,
 ) -> Result<R, ExplainError> {
-    let mut start = None;
+    let mut rounds = Rounds::default();
     let defs = candidates(study, options)?;
     foresee(cache, &kinded(study, defs.iter().cloned()), options);
-    for round in 1.. {
-        let base = fit_as_it_is(cache, study, start, options)?;
-        start = Some(base.z().clone());
+    loop {
+        let base = fit_as_it_is(cache, study, rounds.start(), options)?;
+        rounds.begin(&cache.rows, base.z());
         cache.stage("locate", "where simulation and data disagree");
         let tracks = cache.tracks(&Point { study, theta: base.theta() })?;
         let (periods, change_points) =
@@ -71,30 +68,30 @@ pub(super) fn diagnose<R>(
         let proposed = OnceCell::new();
         let mut found = search(cache, base, &candidates, &tracks, options)?;
         cache.stage("verdict", "");
-        let noise = another_noise(cache, &found).filter(|_| round < ROUNDS);
-        let goes_on = noise.is_some();
-        // As many runs again as all searches so far.
-        let is_afforded = cache.affords_runs(cache.runs());
-        if !(goes_on && is_afforded) {
-            found.cut_short |= goes_on;
-            let (decision, forces) =
-                decide_further(cache, &mut found, &candidates, &proposed, &tracks, options)?;
-            // A version that came in later may be the one whose residuals show what the noise is.
-            if decision.verdict == Verdict::Unexplained
-                && round < ROUNDS
-                && let Some(noise) = another_noise(cache, &found)
-                && cache.affords_runs(cache.runs())
-            {
+        if let Some(noise) = rounds.another_noise(cache, &found) {
+            if is_afforded(cache) {
                 cache.rows.noise = noise;
                 continue;
             }
-            cache.foreseen.goes(Course::Over);
-            let candidates = proposed.get().unwrap_or(&candidates);
-            return then(cache, Diagnosis { found, candidates, decision, tracks: &tracks, forces });
+            found.cut_short = true;
         }
-        cache.rows.noise = noise.unwrap_or_default();
+        let (decision, forces) = decide_further(cache, &mut found, &candidates, &proposed, &tracks, options)?;
+        if decision.verdict == Verdict::Unexplained
+            && is_afforded(cache)
+            && let Some(rows) = rounds.after_nothing(cache, &found)
+        {
+            cache.rows = rows;
+            continue;
+        }
+        cache.foreseen.goes(Course::Over);
+        let candidates = proposed.get().unwrap_or(&candidates);
+        return then(cache, Diagnosis { found, candidates, decision, tracks: &tracks, forces });
     }
-    unreachable!("the last round returns")
+}
+
+/// Whether the budget holds as many runs again as all searches so far.
+fn is_afforded(cache: &RunCache<'_>) -> bool {
+    cache.affords_runs(cache.runs())
 }
 
 /// How much there is to screen first.
@@ -201,12 +198,6 @@ fn made(
 ) -> Proposals {
     let (study, theta) = first_trained(found);
     proposals::proposals(study, &theta, tracks, forces, known)
-}
-
-/// The noise of the best supported version, where that is another than the one in whose units was searched.
-fn another_noise(cache: &RunCache<'_>, found: &SearchResult<'_>) -> Option<Vec<Option<CorrelatedNoise>>> {
-    let noise = best_supported(cache, found);
-    (!noise.is_empty() && !alike(&noise, &cache.rows.noise)).then_some(noise)
 }
 
 /// The fall of χ² that a generic term must promise to be tried: none where nothing explains the gap, or what does is an instrument's error or

@@ -13,7 +13,7 @@
 //! | [`judge`] | what chance would give, the gates, held-out data, the form of an effect, the verdict |
 //! | [`refit`] | the search: refits the best candidates, has them judged, replaces and pairs them in a second pass |
 //! | [`tell`] | the result with its sentences, figures and warnings, the study with the effects in it, storage |
-//! | [`diagnosis`], [`null_recordings`], [`run`] | all steps on one set of recordings, on simulated ones, and the whole workflow |
+//! | [`rounds`], [`diagnosis`], [`null_recordings`], [`run`] | all steps on one set of recordings, on simulated ones, and the whole workflow |
 //!
 //! The search asks for a judgement of every refit before it goes on, and so [`refit`] stands below [`judge`]. Next file to read:
 //! [`run`].
@@ -27,6 +27,7 @@ mod null_recordings;
 mod number;
 mod options;
 mod refit;
+mod rounds;
 mod rows;
 mod run;
 mod run_cache;

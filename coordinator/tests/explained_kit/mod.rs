@@ -18,6 +18,16 @@ pub fn explained(case: &Case) -> Result<Explanation, ExplainError> {
     explain(&study, &mut InProcess::new(2), &store, &mut context, &Options::of(&study)).map(|f| f.explanation)
 }
 
+/// What an instrument shows of these values: with errors of this sd, half of each of which stays in the next (AR(1)), on a display of this step.
+pub fn displayed(clean: &[f64], sd: f64, step: f64, seed: u64) -> Vec<f64> {
+    let mut error = 0.0;
+    let shown = clean.iter().zip(normals(clean.len(), seed)).map(|(v, e)| {
+        error = 0.5 * error + sd * 0.75_f64.sqrt() * e;
+        ((v + error) / step).round() * step
+    });
+    shown.collect()
+}
+
 /// What a column holds of a recording that is made by this study with these values and effect, and noise of this sd.
 pub fn noisy(
     truth: &Case,

@@ -9,6 +9,7 @@ mod column;
 
 use nalgebra::DVector;
 use starlings_estimators::noise_from_third_differences;
+use starlings_estimators::quantiles::squared_t_as_improbable;
 
 use self::column::{Column, Columns};
 use super::effective_noise::{inflation, training_stretches};
@@ -100,7 +101,9 @@ pub(crate) fn leftover(
         correction += &best.all * amplitude;
         taken.push(best);
         // The noise is that of the residuals without the columns taken so far.
-        let noise = inflation(rows, &residual.rows(0, rows.train.len()).into_owned());
+        let without = residual.rows(0, rows.train.len()).into_owned();
+        let (noise, chance) =
+            effective(inflation(rows, &without), without.len(), fit.variant.n_param() + n_column);
         let corrected: Vec<f64> = whitened.iter().zip(&correction).map(|(e, c)| e - c).collect();
         let gain = (optimum.residual().norm_squared() - residual.norm_squared()) / noise;
         let gain_held_out = (before - beyond(&corrected)) / noise;
@@ -109,7 +112,7 @@ pub(crate) fn leftover(
         // Where the residuals do not exceed the noise, the quotient is not defined and its bounds stand for it.
         let share =
             (1.0 - above(&residual) / above(optimum.residual()).max(f64::MIN_POSITIVE)).clamp(-1.0, 1.0);
-        let is_systematic = gain > FIRST + FURTHER * (n_column - 1) as f64
+        let is_systematic = gain > chance * (FIRST + FURTHER * (n_column - 1) as f64)
             && (held.is_empty() || gain_held_out > wanted)
             && share > RESOLVED;
         if n_column == 1 || (is_systematic && !left.is_systematic) {
@@ -117,6 +120,16 @@ pub(crate) fn leftover(
         }
     }
     Ok(left)
+}
+
+/// The effective noise of n residuals with this inflation, and by what factor a fall of χ² must be larger where they alone tell that noise,
+/// less what was fitted to them.
+fn effective(inflation: f64, n: usize, n_fitted: usize) -> (f64, f64) {
+    if inflation <= 1.0 {
+        return (1.0, 1.0);
+    }
+    let freedom = n as f64 - n_fitted as f64;
+    (inflation * n as f64 / freedom.max(1.0), squared_t_as_improbable(FIRST, freedom) / FIRST)
 }
 
 /// χ² of the white part of the residuals, at most that of the stated noise, from their third differences.

@@ -17,7 +17,7 @@ use crate::rows::{Row, Rows, Usage};
 use crate::run_cache::RunCache;
 
 /// Root mean square over its expectation above which held-out data fail ...
-pub(super) const FAILS: f64 = 1.25;
+const FAILS: f64 = 1.25;
 /// ... and which must also lie outside the band of this probability, which is wider where the noise was found and not given.
 const LEVEL: f64 = 0.9998;
 /// What the uncertainty of the estimate explains is known to first order only: a rest below this share of it is no failure.
@@ -94,7 +94,6 @@ pub(crate) fn held_out(
         let explained = uncertainty.as_ref().map_or(0.0, |of| of.allowance(&at, &after));
         let record = &cache.study.records[row.record];
         let beyond = (is - explained).max(0.0) / (n * levels[row.output]);
-        let chance = nis_band_of_uncertain_noise(at.len(), row.noise_freedom, LEVEL).1;
         HeldOut {
             record: record.name.clone(),
             channel: record.channels[row.channel].output.clone(),
@@ -103,11 +102,16 @@ pub(crate) fn held_out(
             before: (squares(&scaled_before) / n).sqrt(),
             after: (squares(&scaled_after) / n).sqrt(),
             beyond: beyond.sqrt(),
-            fails: beyond > (FAILS * FAILS).max(chance) && is - explained > FIRST_ORDER * explained,
+            fails: is_larger(beyond, at.len(), row.noise_freedom) && is - explained > FIRST_ORDER * explained,
             mended: if was > n { ((was - is + explained) / (was - n)).clamp(-1.0, 1.0) } else { 0.0 },
         }
     };
     groups(&rows.rows).into_iter().map(one).collect()
+}
+
+/// Whether a mean square of so many unseen values over the variance of the noise, which is known with this freedom, is more than chance leaves.
+pub(super) fn is_larger(mean_square: f64, n: usize, freedom: f64) -> bool {
+    mean_square > (FAILS * FAILS).max(nis_band_of_uncertain_noise(n, freedom, LEVEL).1)
 }
 
 /// The variance of the noise of every output, over the stated one, with which its held-out errors are compared: where the training

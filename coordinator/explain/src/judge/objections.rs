@@ -7,7 +7,6 @@ use super::contribution::{SECOND_SHARE, SMALL_SHARE};
 use super::form::{Leftover, white_noise, white_share};
 use super::gates::JudgedFit;
 use super::held_out::{FAR, forbidding};
-use super::noise_model::larger;
 use super::search_result::SearchResult;
 use crate::run_cache::RunCache;
 use crate::screen::screening_result::ScreeningResult;
@@ -78,7 +77,7 @@ pub(crate) fn objection(
     if let Some(because) = too_little(judged, &name) {
         return Some(because);
     }
-    if left.is_systematic && !is_remainder(cache, judged) && !is_noise_of_its_own(cache, judged) {
+    if left.is_systematic && !is_remainder(cache, judged) {
         let unseen = judged.misfit.n_held_out > 0 || !judged.held_out.is_empty();
         let held_out = if unseen {
             format!(" and {:.0} on the held-out data", left.gain_held_out)
@@ -133,13 +132,6 @@ fn is_all_but_noise(cache: &RunCache<'_>, judged: &JudgedFit<'_>) -> bool {
     let is_within = judged.adequacy.rmse_over_noise <= 1.0 && is_next_to_nothing(judged);
     judged.share >= 1.0 - SMALL_SHARE
         && (is_within || is_remainder(cache, judged) || may_be_noise_with_memory(cache, judged))
-}
-
-/// Whether the noise was found and what is left may all be noise with a memory, too little for anything else.
-fn is_noise_of_its_own(cache: &RunCache<'_>, judged: &JudgedFit<'_>) -> bool {
-    judged.share >= 1.0 - SMALL_SHARE
-        && may_be_noise_with_memory(cache, judged)
-        && !larger(&cache.rows, &judged.fit.predicted).is_empty()
 }
 
 /// Whether what is left above the noise is less than a further effect would have to bring, and nothing is far from it, held out or not.

@@ -98,11 +98,24 @@ pub(crate) fn probabilities(
     let inflation = nearest.map_or(found.adequacy.inflation, |j| j.inflation);
     // An effect pays what a search gains by chance; those beyond the first have paid in their gain.
     let support = |of: f64| 0.5 * (of / inflation - found.null_distribution.threshold);
+    let class: Vec<&JudgedFit<'_>> = if is_answered {
+        best.into_iter().chain(decision.rivals.iter().map(|i| &found.judged[*i])).collect()
+    } else {
+        Vec::new()
+    };
+    let lift = lift(&counted, &class);
     let mut weights: Vec<(ProbableSet, f64)> = Vec::new();
     for judged in counted {
-        // A set that adds something small to what is told does not speak against it.
-        let told = best.filter(|best| is_answered && holds(judged, best)).unwrap_or(judged);
-        add(&mut weights, told.names(), &told.fit.variant.left_out, support(judged.standing()));
+        let of_class = class.iter().any(|told| holds(judged, told));
+        if !of_class || is_among(judged, &class) {
+            let lift = if of_class { lift } else { 0.0 };
+            add(
+                &mut weights,
+                judged.names(),
+                &judged.fit.variant.left_out,
+                support(judged.standing() + lift),
+            );
+        }
     }
     // What was not refitted and does the same as what is told has its support, but for the prior.
     if let Some(best) = best.filter(|_| is_answered) {
@@ -111,7 +124,8 @@ pub(crate) fn probabilities(
             let Some(members) = set.iter().map(of).collect::<Option<Vec<_>>>() else { continue };
             let prior = inflation * members.iter().map(|c| c.kind.price()).sum::<f64>();
             if !found.judged.iter().any(|j| j.names() == *set) {
-                add(&mut weights, set.clone(), &best.fit.variant.left_out, support(best.rank() - prior));
+                let left_out = &best.fit.variant.left_out;
+                add(&mut weights, set.clone(), left_out, support(best.rank() - prior + lift));
             }
         }
     }
@@ -144,6 +158,21 @@ fn still_listed(listed: f64, left: &Adequacy, discrepancy: f64) -> f64 {
 fn counts(judged: &JudgedFit<'_>, is_answered: bool) -> bool {
     let is_possible = |gate: &str| !is_answered && !matches!(gate, "failed" | "sign" | "range");
     judged.refusal.as_ref().is_none_or(|r| is_possible(r.gate))
+}
+
+/// By how much a set that adds something small to one of a class does better than the class. It speaks against none of that, since the same may stand
+/// beside each, and so counts for all of it.
+fn lift(counted: &[&JudgedFit<'_>], class: &[&JudgedFit<'_>]) -> f64 {
+    let most = |of: &mut dyn Iterator<Item = f64>| of.fold(f64::NEG_INFINITY, f64::max);
+    let with_more = counted.iter().filter(|judged| class.iter().any(|told| holds(judged, told)));
+    let with_more = most(&mut with_more.map(|judged| judged.standing()));
+    let alone = most(&mut class.iter().map(|told| told.standing()));
+    if class.is_empty() { 0.0 } else { (with_more - alone).max(0.0) }
+}
+
+/// Whether a variant is one of these.
+fn is_among(judged: &JudgedFit<'_>, class: &[&JudgedFit<'_>]) -> bool {
+    class.iter().any(|told| holds(judged, told) && holds(told, judged))
 }
 
 /// Whether a variant has all the effects of another.

@@ -13,6 +13,7 @@ use super::rivals::{MARGIN, rivals};
 use super::search_result::SearchResult;
 use crate::error::ExplainError;
 use crate::fit::candidate::Candidate;
+use crate::fit::kind::Kind;
 use crate::fit::model_variant::AddedEffect;
 use crate::fit::same_form::same_form;
 use crate::run_cache::RunCache;
@@ -26,7 +27,7 @@ pub(crate) const ALIKE: f64 = 0.995;
 const POWER: f64 = 90.0;
 /// Posterior over prior standard deviation above which the data do not determine a parameter inside a term.
 const UNINFORMED: f64 = 0.5;
-/// Difference in χ² below which it is a toss-up which kind of a class is told first: odds of two to one.
+/// Difference in χ² below which it is a toss-up which of a class is told first: odds of two to one.
 const TOSS_UP: f64 = 1.4;
 
 /// The verdict on a misfit.
@@ -130,20 +131,22 @@ fn shown(found: &SearchResult<'_>, best: usize, rivals: &mut [usize]) -> usize {
     let class: Vec<usize> = std::iter::once(best).chain(rivals.iter().copied()).collect();
     let judged = class.iter().map(|i| &found.judged[*i]);
     let described: Vec<_> = judged.map(|j| (j.standing(), j.kinds(), complexity(j))).collect();
-    let told = class[leading(&described, found.judged[best].inflation)];
+    let is_law = |kinds: &Vec<Kind>| kinds.iter().all(|kind| kind.is_of_a_field());
+    let told = class[leading(&described, is_law, found.judged[best].inflation)];
     if let Some(place) = rivals.iter_mut().find(|i| **i == told) {
         *place = best;
     }
     told
 }
 
-/// The position of what is best supported, the prior included; of its kind the simplest of what is tied with it, and another kind only where
-/// it is a toss-up and the likelier one before any data, since the prior counts already. `unit` is the effective noise.
-fn leading<K: Ord, C: Ord>(class: &[(f64, K, C)], unit: f64) -> usize {
+/// The position of what is best supported, the prior included. Of what is a toss-up with it the likeliest before any data is told, and of that the
+/// simplest. A law of a field gives way to any simpler one that is tied with it; a term that describes a dependence has nothing but its support.
+/// `unit` is the effective noise.
+fn leading<K: Ord, C: Ord>(class: &[(f64, K, C)], is_law: impl Fn(&K) -> bool, unit: f64) -> usize {
     let Some(best) = class.iter().max_by(|a, b| a.0.total_cmp(&b.0)) else { return 0 };
     let is_near = |(standing, kind, _): &(f64, K, C)| {
         let behind = best.0 - standing;
-        behind <= TOSS_UP * unit || (behind <= MARGIN * unit && *kind == best.1)
+        behind <= TOSS_UP * unit || (behind <= MARGIN * unit && *kind == best.1 && is_law(kind))
     };
     let near = class.iter().enumerate().filter(|(_, of)| is_near(of));
     let told = near.min_by(|(_, a), (_, b)| (&a.1, &a.2).cmp(&(&b.1, &b.2)).then(b.0.total_cmp(&a.0)));
@@ -267,20 +270,22 @@ mod tests {
     }
 
     #[test]
-    fn of_a_tie_the_best_supported_is_told_and_the_simplest_only_of_what_is_equally_so() {
-        // A proposal of two operations beside the best, which has three, and a constant of a likelier kind that is behind.
-        let class = |proposal: f64, constant: f64| {
-            [(100.0, 'p', 3), (100.0 - proposal, 'p', 2), (100.0 - constant, 'g', 0)]
+    fn of_a_tie_the_best_supported_is_told_and_the_simplest_of_a_toss_up_or_of_laws() {
+        let leading = |class: &[(f64, char, usize)], unit| leading(class, |kind| *kind == 'l', unit);
+        // A term of two operations beside the best, which has three, and a constant of a likelier kind that is behind.
+        let class = |kind: char, simpler: f64, constant: f64| {
+            [(100.0, kind, 3), (100.0 - simpler, kind, 2), (100.0 - constant, 'c', 0)]
         };
-        assert_eq!(leading(&class(7.0, 9.0), 1.0), 0);
-        assert_eq!(leading(&class(5.0, 9.0), 1.0), 1, "as good as tied, and simpler");
-        assert_eq!(leading(&class(5.0, 5.0), 1.0), 1, "what its kind is worth is counted already");
-        assert_eq!(leading(&class(5.0, 1.0), 1.0), 2, "a toss-up");
+        assert_eq!(leading(&class('p', 5.0, 5.0), 1.0), 0, "tied, and less supported");
+        assert_eq!(leading(&class('l', 5.0, 5.0), 1.0), 1, "the linear law of two that are tied");
+        assert_eq!(leading(&class('l', 7.0, 5.0), 1.0), 0, "no longer tied");
+        assert_eq!(leading(&class('p', 1.0, 5.0), 1.0), 1, "a toss-up, and simpler");
+        assert_eq!(leading(&class('p', 1.0, 1.0), 1.0), 2, "a toss-up, and likelier before any data");
         // What a pair ended in may stand behind another single effect.
-        assert_eq!(leading(&class(-7.0, 9.0), 1.0), 1);
-        assert_eq!(leading(&[(90.0, 'p', 0), (93.0, 'p', 0)], 1.0), 1, "of two that are equal otherwise");
+        assert_eq!(leading(&class('p', -7.0, 9.0), 1.0), 1);
+        assert_eq!(leading(&[(90.0, 'p', 0), (91.0, 'p', 0)], 1.0), 1, "of two that are equal otherwise");
         assert_eq!(
-            leading(&class(5.0, 9.0), 10.0),
+            leading(&class('p', 5.0, 9.0), 10.0),
             2,
             "in residuals of a larger effective noise all are equal"
         );

@@ -1,5 +1,7 @@
 //! Rows and noise for tests.
 
+use starlings_estimators::CorrelatedNoise;
+
 use super::{Row, Rows, Usage};
 
 impl Rows {
@@ -22,6 +24,19 @@ impl Rows {
         let rows: Vec<Row> = (0..n).map(row).collect();
         let train = (0..n).filter(|i| rows[*i].usage == Usage::Train).collect();
         Self { train, rows, noise: Vec::new() }
+    }
+
+    /// One channel of n training rows whose values are this noise.
+    pub(crate) fn of_noise(noise: CorrelatedNoise, n: usize, seed: u64) -> Self {
+        let mut rows = Self::sample(n, |_| Usage::Train);
+        rows.noise = vec![Some(noise)];
+        let mut values = white(n, seed).as_slice().to_vec();
+        rows.colour(0, &mut values);
+        for (row, value) in rows.rows.iter_mut().zip(values) {
+            row.observed = value;
+        }
+        rows.noise.clear();
+        rows
     }
 }
 

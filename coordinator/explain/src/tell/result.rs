@@ -4,6 +4,7 @@
 
 use serde::{Deserialize, Serialize};
 
+pub use super::correlated::CorrelatedChannel;
 use crate::fit::kind::Kind;
 use crate::judge::held_out::HeldOut;
 use crate::judge::probability::Probabilities;
@@ -189,19 +190,6 @@ pub struct GapRow {
     pub after: f64,
     /// Noise sd.
     pub noise: f64,
-}
-
-/// Noise of the stated size that is correlated in time, as an Ornstein–Uhlenbeck process is.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct CorrelatedChannel {
-    /// Output name.
-    pub channel: String,
-    /// Share of the noise's variance that is correlated; the rest is white.
-    pub share: f64,
-    /// Time over which that correlation falls to 1/e.
-    pub length: f64,
-    /// Unit of the time.
-    pub unit: String,
 }
 
 /// What is left of the gap.

@@ -93,7 +93,7 @@ fn far_from_prior(base: &FittedVariant<'_>) -> Option<String> {
     })
 }
 
-/// What could be correlated noise that was found too small: of the model as it is where nothing explains the gap, else of what is told or came
+/// The noise whose size the residuals alone tell, where the search was made in units of it; else what could be such a noise: of the model as it is where nothing explains the gap, else of what is told or came
 /// nearest.
 fn larger_noise(
     cache: &RunCache<'_>,
@@ -101,6 +101,10 @@ fn larger_noise(
     decision: &Decision,
     best: Option<&JudgedFit<'_>>,
 ) -> Vec<String> {
+    let assumed = correlated::assumed(&correlated::correlated_noise(cache.study, &cache.rows));
+    if !assumed.is_empty() {
+        return assumed;
+    }
     let of = |fit: &FittedVariant<'_>, name: &str| {
         correlated::larger(cache.study, &cache.rows, &fit.predicted, name)
     };

@@ -9,8 +9,9 @@ use std::fmt::Write as _;
 use starlings_estimators::correlation;
 use starlings_study::{CORRELATED, posterior};
 
-use super::correlated::{correlated_noise, listed as listed_noise};
+use super::correlated::{correlated_noise, listed as listed_noise, sentence as noise_sentence};
 use super::errors::shrinking;
+use super::result::CorrelatedChannel;
 use super::tie::{first, tied};
 use crate::fit::candidate::Candidate;
 use crate::fit::fitted_variant::FittedVariant;
@@ -70,7 +71,7 @@ pub(crate) fn headline(
     decision: &Decision,
 ) -> String {
     let best = decision.best.map(|i| &found.judged[i]);
-    let noise = listed_noise(&correlated_noise(cache.study, &cache.rows));
+    let noise = correlated_noise(cache.study, &cache.rows);
     let verdict = match (decision.verdict, best) {
         (Verdict::Named, Some(judged)) => {
             let shrinking = capital(&shrinking(cache, found, judged));
@@ -98,7 +99,7 @@ pub(crate) fn headline(
             return no_gap(found, &noise) + &why.unwrap_or_default();
         }
     };
-    if noise.is_empty() { verdict } else { format!("{verdict} The noise is correlated in time: {noise}.") }
+    verdict + &noise_sentence(&noise)
 }
 
 /// That nothing explains the gap, why, what fails of what was held out, and what was not tried.
@@ -129,11 +130,20 @@ fn unexplained(
 }
 
 /// That the data show no gap, with what they could have shown.
-fn no_gap(found: &SearchResult<'_>, noise: &str) -> String {
+fn no_gap(found: &SearchResult<'_>, noise: &[CorrelatedChannel]) -> String {
     let says = found.adequacy.says();
+    let is_assumed = noise.iter().any(|of| of.sd.is_some());
     let training = match found.adequacy.nature() {
+        Nature::Noise | Nature::Smaller if is_assumed => format!(
+            "No gap that these data show: what the model leaves may be noise that is correlated in time, whose size the study does not \
+             state: {}. In units of that noise {says}.",
+            listed_noise(noise)
+        ),
         Nature::Noise | Nature::Smaller if !noise.is_empty() => {
-            format!("No gap, the noise is correlated in time: {noise}. In units of that noise {says}.")
+            format!(
+                "No gap, the noise is correlated in time: {}. In units of that noise {says}.",
+                listed_noise(noise)
+            )
         }
         Nature::Nothing => return format!("No gap could be seen: {says}."),
         Nature::Noise if found.adequacy.whiteness.is_some() => {

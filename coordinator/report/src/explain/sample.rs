@@ -166,7 +166,14 @@ fn held_out() -> Vec<HeldOut> {
 
 fn correlated_noise() -> Vec<CorrelatedChannel> {
     let (channel, unit) = ("pressure".into(), "s".into());
-    vec![CorrelatedChannel { channel, share: 0.97, length: 0.021, unit }]
+    vec![CorrelatedChannel {
+        channel,
+        share: 0.97,
+        length: 0.021,
+        unit,
+        sd: None,
+        channel_unit: String::new(),
+    }]
 }
 
 fn remaining() -> Remaining {

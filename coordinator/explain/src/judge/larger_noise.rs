@@ -1,0 +1,164 @@
+//! Noise with a memory that is larger than the one that was found.
+//!
+//! A noise that nobody stated is found from third differences, which take its slow part for signal: what it leaves may be that noise, of a
+//! size that only the residuals tell. Next file to read: [`super::noise_model`].
+
+use starlings_estimators::CorrelatedNoise;
+
+use super::adequacy::Adequacy;
+use super::held_out::is_larger;
+use super::noise_model::{VersionNoise, most_supported, of_version};
+use super::search_result::SearchResult;
+use crate::fit::fitted_variant::FittedVariant;
+use crate::rows::{Row, Rows, Usage};
+use crate::run_cache::RunCache;
+
+/// A noise with a memory that the stated size excludes and one that was found does not.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct LargerNoise {
+    /// Index of the output.
+    pub output: usize,
+    /// Its sd, over the one that was found.
+    pub factor: f64,
+    /// It, in units of its own variance.
+    pub noise: CorrelatedNoise,
+}
+
+/// The rows in units of the noise of the version that is best supported, the model as it is included, of those that leave nothing but noise
+/// if it is as large as their residuals; `None` without any.
+pub(crate) fn in_larger_noise(cache: &RunCache<'_>, found: &SearchResult<'_>) -> Option<Rows> {
+    let of = |fit: &FittedVariant<'_>| {
+        let rows = in_noise_of(&cache.rows, &fit.predicted)?;
+        let AsLarge { factors, log_density, .. } = AsLarge::new(&cache.rows, &fit.predicted);
+        // The size is one more number that is fitted (Schwarz 1978).
+        let n_size = factors.iter().filter(|factor| **factor > 1.0).count() as f64;
+        Some((log_density - 0.5 * n_size * (cache.rows.train.len().max(1) as f64).ln(), rows))
+    };
+    most_supported(cache, found, of).map(|(rows, _)| rows)
+}
+
+/// The rows in units of a noise as large as what these predictions leave, where that may be all noise.
+fn in_noise_of(rows: &Rows, predicted: &[f64]) -> Option<Rows> {
+    let larger = larger(rows, predicted);
+    let mut rows = rows.clone();
+    rows.noise.resize(rows.n_output(), None);
+    for LargerNoise { output, factor, noise } in &larger {
+        rows.noise[*output] = Some(*noise);
+        for row in rows.rows.iter_mut().filter(|row| row.output == *output && is_found(row)) {
+            row.noise *= factor;
+        }
+    }
+    (!larger.is_empty() && !Adequacy::of_rows(&rows, predicted).is_gap()).then_some(rows)
+}
+
+/// The outputs whose noise was found, by differences that take the slow part of a noise for signal, and whose residuals are all noise if
+/// theirs is as large as they are and correlated: white in units of that noise, and no larger where they were held out.
+pub(crate) fn larger(rows: &Rows, predicted: &[f64]) -> Vec<LargerNoise> {
+    let AsLarge { rows, factors, .. } = AsLarge::new(rows, predicted);
+    if Adequacy::of_rows(&rows, predicted).is_gap() {
+        return Vec::new();
+    }
+    let whitened = rows.whitened(predicted);
+    let squares = |output: usize, usage: Usage| -> Vec<f64> {
+        let of =
+            (0..rows.rows.len()).filter(|i| rows.rows[*i].output == output && rows.rows[*i].usage == usage);
+        of.map(|i| whitened[i].powi(2)).collect()
+    };
+    let is_as_large = |output: usize| {
+        let (unseen, n) = (squares(output, Usage::HeldOut), squares(output, Usage::Train).len());
+        let mean = unseen.iter().sum::<f64>() / unseen.len().max(1) as f64;
+        !is_larger(mean, unseen.len(), n as f64)
+    };
+    let with_memory = |(output, noise): (usize, &Option<CorrelatedNoise>)| {
+        let (factor, noise) = (factors[output], (*noise)?);
+        (factor > 1.0).then_some(LargerNoise { output, factor, noise })
+    };
+    let larger: Vec<LargerNoise> = rows.noise.iter().enumerate().filter_map(with_memory).collect();
+    if larger.iter().all(|of| is_as_large(of.output)) { larger } else { Vec::new() }
+}
+
+/// The rows in units of a noise as large as the residuals, where it was found.
+struct AsLarge {
+    rows: Rows,
+    /// By how much the noise of each output grows.
+    factors: Vec<f64>,
+    /// Log density of the training rows, less the price of the memory.
+    log_density: f64,
+}
+
+impl AsLarge {
+    fn new(rows: &Rows, predicted: &[f64]) -> Self {
+        let mut rows = Rows { noise: Vec::new(), ..rows.clone() };
+        let scaled = rows.scaled(predicted);
+        let shown = rows.mean_squares(&scaled, 1, is_found);
+        let factors: Vec<f64> =
+            shown.iter().map(|square| square.map_or(1.0, |s| s.sqrt().max(1.0))).collect();
+        for row in rows.rows.iter_mut().filter(|row| is_found(row)) {
+            row.noise *= factors[row.output];
+        }
+        let VersionNoise { log_density, noise } =
+            of_version(&rows, predicted, &|output| shown[output].is_none());
+        let trained = rows.train.iter().map(|i| &rows.rows[*i]).filter(|row| is_found(row));
+        let grown: f64 = trained.map(|row| factors[row.output].ln()).sum();
+        rows.noise = noise;
+        Self { rows, factors, log_density: log_density - grown }
+    }
+}
+
+/// Whether the noise of a row was found.
+fn is_found(row: &Row) -> bool {
+    row.noise_freedom.is_finite()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_noise_that_was_found_may_be_larger_and_correlated_where_one_that_was_stated_may_not() {
+        let n = 550;
+        let mut rows =
+            Rows::of_noise(CorrelatedNoise { white: 1e-9, correlated: 1.0, length: 1.957_6 }, n, 3);
+        let zero = vec![0.0; n];
+        for row in &mut rows.rows {
+            row.noise = 0.6;
+        }
+        assert_eq!(larger(&rows, &zero), [], "stated");
+        for row in &mut rows.rows {
+            row.noise_freedom = 100.0;
+        }
+        let [found] = larger(&rows, &zero)[..] else { panic!("not heard") };
+        // Of 550 values some 140 are independent: the sd is known to 6 %, the length to a factor.
+        assert!(
+            (0.6 * found.factor - 1.0).abs() < 0.2 && (found.noise.length / 1.957_6).ln().abs() < 1.0,
+            "{found:?}"
+        );
+        // A second record whose noise of the same output was stated: larger residuals there are a gap.
+        let mut beside = rows.clone();
+        beside.rows.extend(rows.rows.iter().map(|row| Row {
+            record: 1,
+            noise_freedom: f64::INFINITY,
+            ..*row
+        }));
+        beside.train = (0..2 * n).collect();
+        assert_eq!(larger(&beside, &vec![0.0; 2 * n]), [], "one of them stated");
+        // A second output with a slow gap above its stated noise.
+        let slow = |i: usize| 4.0 * (0.05 * i as f64).sin();
+        let other = |(i, row): (usize, &Row)| Row {
+            output: 1,
+            channel: 1,
+            observed: slow(i),
+            noise: 1.0,
+            noise_freedom: f64::INFINITY,
+            ..*row
+        };
+        beside.rows.truncate(n);
+        beside.rows.extend(rows.rows.iter().enumerate().map(other));
+        assert_eq!(larger(&beside, &vec![0.0; 2 * n]), [], "not all is noise");
+        for row in rows.rows.iter_mut().skip(300) {
+            (row.usage, row.observed) = (Usage::HeldOut, row.observed + 2.5);
+        }
+        rows.train.truncate(300);
+        assert_eq!(larger(&rows, &zero), [], "what was held out is no such noise");
+    }
+}

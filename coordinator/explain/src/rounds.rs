@@ -1,0 +1,85 @@
+//! The searches of a diagnosis, one after the other, and the noise in whose units each is made.
+//!
+//! The first counts in the noise as it was stated or found. Another one counts in the noise with a memory that the best supported version
+//! shows. Where nothing explains the gap and the size of a noise was not stated, that may be larger than was found; if nothing explains the
+//! gap in units of that either, what was found before stands. Next file to read: [`crate::judge::noise_model`].
+
+use nalgebra::DVector;
+use starlings_estimators::CorrelatedNoise;
+
+use crate::judge::larger_noise::in_larger_noise;
+use crate::judge::noise_model::{alike, best_supported};
+use crate::judge::search_result::SearchResult;
+use crate::rows::Rows;
+use crate::run_cache::RunCache;
+
+/// Searches at most, each in units of the noise that the last one showed.
+const MOST: usize = 3;
+
+/// Where a search begins.
+#[derive(Clone)]
+struct Begin {
+    rows: Rows,
+    /// Where the fit of the model as it is starts; at the prior for `None`.
+    start: Option<DVector<f64>>,
+}
+
+/// The searches so far.
+#[derive(Default)]
+pub(crate) struct Rounds {
+    n: usize,
+    /// Where the next fit starts.
+    start: Option<DVector<f64>>,
+    /// Where the search began that is under way.
+    current: Option<Begin>,
+    /// Where the one began before that, if the one under way is in units of a noise larger than was found.
+    smaller: Option<Begin>,
+    /// Whether none follows.
+    is_over: bool,
+}
+
+impl Rounds {
+    /// Where the fit of the model as it is starts.
+    pub(crate) fn start(&self) -> Option<DVector<f64>> {
+        self.start.clone()
+    }
+
+    /// A search has begun in units of the noise of these rows, with the model as it is fitted here.
+    pub(crate) fn begin(&mut self, rows: &Rows, fitted: &DVector<f64>) {
+        let start = self.start.replace(fitted.clone());
+        self.current = Some(Begin { rows: rows.clone(), start });
+        self.n += 1;
+    }
+
+    /// The noise of the best supported version, where another search may be made in units of it and it is another one.
+    pub(crate) fn another_noise(
+        &self,
+        cache: &RunCache<'_>,
+        found: &SearchResult<'_>,
+    ) -> Option<Vec<Option<CorrelatedNoise>>> {
+        // A noise of a size that the residuals tell is the last that is asked of them.
+        if self.is_over || self.smaller.is_some() || self.n >= MOST {
+            return None;
+        }
+        let noise = best_supported(cache, found);
+        (!noise.is_empty() && !alike(&noise, &cache.rows.noise)).then_some(noise)
+    }
+
+    /// The rows in whose units to search again after a search in which nothing explains the gap: a version that came in later may be the one
+    /// whose residuals show what the noise is, or a noise that was found may be larger.
+    pub(crate) fn after_nothing(&mut self, cache: &RunCache<'_>, found: &SearchResult<'_>) -> Option<Rows> {
+        if let Some(Begin { rows, start }) = self.smaller.take() {
+            (self.start, self.is_over) = (start, true);
+            return Some(rows);
+        }
+        if let Some(noise) = self.another_noise(cache, found) {
+            return Some(Rows { noise, ..cache.rows.clone() });
+        }
+        if self.is_over {
+            return None;
+        }
+        let rows = in_larger_noise(cache, found)?;
+        self.smaller.clone_from(&self.current);
+        Some(rows)
+    }
+}
