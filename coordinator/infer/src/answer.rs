@@ -4,8 +4,8 @@
 
 use nalgebra::{DMatrix, DVector};
 use starlings_estimators::inference::{
-    Coefficient, Diffusion, Extrapolated, Fit, InferenceError, NoiseCheck, Posterior, Prior, Strength,
-    Structure, Sums, Verdict, extrapolate, noise_checks,
+    Coefficient, Diffusion, Estimate, Extrapolated, Fit, InferenceError, NoiseCheck, Posterior, Prior,
+    Strength, Structure, Sums, Verdict, extrapolate, noise_checks,
 };
 use starlings_study::infer_choice::{DiffusionChoice, InferChoice, MeasuredChoice};
 
@@ -122,6 +122,8 @@ pub(crate) struct Answer {
     pub(crate) extrapolated: Option<Extrapolated>,
     /// What went less well than was asked for.
     pub(crate) doubts: Vec<String>,
+    /// The estimates of constant noise, where those of the posterior hold for noise of any size.
+    constant: Option<Vec<Estimate>>,
 }
 
 impl Answer {
@@ -143,7 +145,7 @@ impl Answer {
             Ok(extrapolated) => (extrapolated, Vec::new()),
             Err(doubt) => (None, vec![doubt]),
         };
-        Ok(Self { posterior, checks, lag_corrected, extrapolated, doubts })
+        Ok(Self { posterior, checks, lag_corrected, extrapolated, doubts, constant: None })
     }
 
     /// The posterior from a smoothed path, where the standard deviation of the measurement is known. The recording as it was measured
@@ -167,7 +169,30 @@ impl Answer {
         };
         let found = smoothed(question, fit, &choice.records, cut, sd, teller)?;
         let doubts = not_converged(found.converged, found.log_likelihood.len()).into_iter().collect();
-        Ok(Self { posterior: found.posterior, checks, lag_corrected: false, extrapolated: None, doubts })
+        let posterior = found.posterior;
+        Ok(Self { posterior, checks, lag_corrected: false, extrapolated: None, doubts, constant: None })
+    }
+
+    /// Takes a posterior that holds for noise of any size, where there is one.
+    pub(crate) fn take_robust(&mut self, robust: Option<Posterior>) {
+        if let Some(robust) = robust {
+            self.constant = Some(std::mem::replace(&mut self.posterior, robust).estimates);
+        }
+    }
+
+    /// How many times as wide as of constant noise the interval of a coefficient is; 1 where it is that.
+    pub(crate) fn widening(&self, name: &str) -> f64 {
+        let sd = |estimates: &[Estimate]| estimates.iter().find(|e| e.name == name)?.value.map(|v| v.sd);
+        let constant = self.constant.as_deref().and_then(sd);
+        constant.zip(sd(&self.posterior.estimates)).map_or(1.0, |(constant, sd)| sd / constant)
+    }
+
+    /// The least and the most of that over the coefficients; `None` where the intervals are those of constant noise.
+    pub(crate) fn widened(&self) -> Option<[f64; 2]> {
+        let estimates = self.constant.as_deref()?.iter().filter(|estimate| estimate.value.is_some());
+        let all: Vec<f64> = estimates.map(|estimate| self.widening(&estimate.name)).collect();
+        let most = all.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        Some([all.iter().copied().fold(f64::INFINITY, f64::min), most])
     }
 
     /// Means of the coefficients that have a value, at no step where they were extrapolated.

@@ -9,6 +9,7 @@
 //! | `convergence` | the estimate after each power of two of blocks |
 //! | `smoothed` | the same from a smoothed path, where the measurement's noise is known |
 //! | `hidden`, `coarse` | whether errors of the measurement, or the recording's steps, are in the way |
+//! | `doubts`, `varying`, `constancy` | what else is doubtful of a recording: noise that is not constant, coefficients that change |
 //! | `missing` | which terms the drift lacks, among candidates |
 //! | [`explained`](mod@explained) | what was found of missing terms as an explanation |
 //! | [`reduced`] | a model with fewer unknowns than coefficients |
@@ -25,6 +26,7 @@ mod blocks;
 mod coarse;
 mod constancy;
 mod convergence;
+mod doubts;
 pub mod error;
 mod even_step;
 pub mod explained;
@@ -43,6 +45,7 @@ pub mod result;
 mod rows;
 pub mod run;
 mod smoothed;
+mod varying;
 mod words;
 
 pub use error::InferError;
