@@ -66,6 +66,7 @@ pub use posterior::{Estimate, Posterior, Value};
 pub use prior::Prior;
 pub use reduced::{Reduced, reduce};
 pub use regression::Regression;
+pub use residuals::lag_spread;
 pub use stream::{STEP_TOLERANCE, Stream, StreamState};
 pub use structure::{Coefficient, Place, Structure};
 pub use sums::Sums;

@@ -13,6 +13,7 @@
 //! | `missing` | which terms the drift lacks, among candidates |
 //! | [`explained`](mod@explained) | what was found of missing terms as an explanation |
 //! | [`reduced`] | a model with fewer unknowns than coefficients |
+//! | `fitted` | a fit, with what its residuals say of the measurement |
 //! | [`result`], `answer`, `words` | the tables with intervals, and what is said of them |
 //! | [`follow`](mod@follow) | a recording that is still written: estimates and alarms as it arrives |
 //! | [`forecast`](mod@forecast) | an ensemble of what comes next, drawn from the posterior |
@@ -31,6 +32,7 @@ pub mod error;
 mod even_step;
 pub mod explained;
 mod file_blocks;
+mod fitted;
 pub mod follow;
 pub mod forecast;
 mod gather;

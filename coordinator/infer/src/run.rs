@@ -68,7 +68,7 @@ pub fn infer(
     let structure = &asked.question.structure;
     let mut answer = match choice.measured {
         MeasuredChoice::Known(sd) => Answer::smoothed(&asked, cut, sd, &gathered.levels, &mut teller)?,
-        _ => Answer::of(choice, &asked.fit, structure, &gathered.levels)?,
+        _ => Answer::of(choice, &asked.fit, structure, (&asked.question.basis, &gathered))?,
     };
     let fit = Fit { lag_corrected: answer.lag_corrected, ..asked.fit.clone() };
     let missing = missing(&asked, &fit, &gathered, cut, fleet, (reader, &mut teller))?;

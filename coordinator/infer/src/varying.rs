@@ -13,7 +13,7 @@ use crate::result::NoiseVaries;
 use crate::run::Asked;
 
 /// Probability of telling noise that varies in a recording in which it does not.
-const FALSE_ALARM: f64 = 1e-3;
+pub(crate) const FALSE_ALARM: f64 = 1e-3;
 /// Ratio of noise up to which coarse steps, or errors of the measurement that matter, let it look as if it varied: of errors a drift of
 /// slope f' brings (f'h)²/2 of their own variance with it, which differs from state to state.
 const HIDDEN: f64 = 1.5;

@@ -65,3 +65,28 @@ impl<'a> Residuals<'a> {
         &self.slopes
     }
 }
+
+/// How many times as large as under constant noise the sampling error of each equation's residuals at lag one is, length L, at least once:
+/// the root of E r_n² r_{n+1}² over E r².
+///
+/// # Errors
+/// `Incompatible` pairs of another basis.
+pub fn lag_spread(
+    pairs: &Pairs,
+    basis: &Basis,
+    drift: &DMatrix<f64>,
+    step: f64,
+) -> Result<Vec<f64>, InferenceError> {
+    let mut residuals = Residuals::new(pairs, basis, drift, step)?;
+    let mut sums = vec![[0.0; 2]; basis.n_state()];
+    for pair in pairs.iter() {
+        let first = residuals.of(&pair, 0).to_vec();
+        for ([squares, products], (a, b)) in sums.iter_mut().zip(first.iter().zip(residuals.of(&pair, 1))) {
+            *squares += 0.5 * (a * a + b * b);
+            *products += (a * b).powi(2);
+        }
+    }
+    let n = pairs.n_pair() as f64;
+    let spread = |[squares, products]: &[f64; 2]| (n * products).sqrt() / squares;
+    Ok(sums.iter().map(|sums| spread(sums).max(1.0)).collect())
+}

@@ -4,11 +4,12 @@ use std::sync::Arc;
 
 use nalgebra::DMatrix;
 use starlings_estimators::inference::{
-    Basis, Diffusion, Fit, Function, Pairs, Polynomial, Posterior, Rule, Structure, Varying, With, varying,
+    Basis, Diffusion, Fit, Function, Pairs, Polynomial, Posterior, Rule, Structure, Varying, With,
+    lag_spread, noise_checks, varying,
 };
 
 use crate::kit::sde::{gauss, record, rng};
-use crate::kit::{lorenz, motor, sums, tanks, times};
+use crate::kit::{lorenz, motor, sd, sums, tanks, times};
 
 /// Rate of false alarms that is asked for.
 const RATE: f64 = 1e-3;
@@ -232,4 +233,30 @@ fn functions_at_the_left_point_are_not_moved() {
     assert!((mean(&left.robust) - mean(&left.constant)).abs() < 1e-12);
     let (off, sd) = (mean(&mid.constant) - mean(&mid.robust), mid.robust.estimates[0].value.unwrap().sd);
     assert!(off.abs() > 0.5 * sd, "the mid-point's own is off: {off} ± {sd}");
+}
+
+#[test]
+fn residuals_at_lag_one_are_told_to_be_known_less_well_under_noise_that_varies() {
+    let basis = polynomial(1, false);
+    let structure = Structure::same(&basis, &["x"]).unwrap();
+    let fit = Fit::new(Diffusion::Diagonal, 1);
+    // Ratios over their sampling error, as it is for constant noise and as it is for any.
+    let ratios = |size: &dyn Fn(f64) -> f64| {
+        let one = |seed: u64| {
+            let rows = path(700 + seed, 2000, |_, x| -x, |_, x| size(x));
+            let sums = sums(&basis, &rows, H);
+            let posterior = fit.posterior(&sums, &structure).unwrap();
+            let check = noise_checks(&sums, &structure, &posterior).unwrap().remove(0);
+            let spread = lag_spread(&pairs(&rows, H), &basis, posterior.drift(), H).unwrap()[0];
+            let wider = check.clone().widened(spread);
+            [check.ratio / check.sd, wider.ratio / wider.sd]
+        };
+        let all: Vec<[f64; 2]> = (0..200).map(one).collect();
+        [0, 1].map(|k| sd(&all.iter().map(|of| of[k]).collect::<Vec<_>>()))
+    };
+    let (constant, varying) = (ratios(&|_| 0.5), ratios(&|x| 0.3 + 0.7 * x.abs()));
+    println!("sd of ratios over their error: {constant:.2?} and {varying:.2?}");
+    // Five of a hundred are the sd of each.
+    assert!(constant.iter().all(|of| (0.85..1.15).contains(of)), "{constant:?}");
+    assert!(varying[0] > 1.3 && (0.85..1.2).contains(&varying[1]), "{varying:?}");
 }
