@@ -7,6 +7,7 @@ mod infer_kit;
 
 use std::fmt::Write as _;
 
+use common::{output, starlings};
 use infer_kit::{STUDY, folder, infer, noise, recording, refused};
 use serde_json::Value;
 
@@ -123,4 +124,63 @@ fn a_table_of_other_separators_or_in_another_order_is_told_as_that() {
         &(rows.join("\n") + "\n"),
         &["later than the one before: 19.99 follows 20", "sort the rows"],
     );
+}
+
+/// A decay by its rate `a*x - b*x^3` under noise of any size, as its file.
+fn bistable(size: impl Fn(f64) -> f64) -> String {
+    let (mut noise, mut x, mut text) = (noise(11), 1.0_f64, "time,x\n".to_owned());
+    let h: f64 = 0.002;
+    for k in 0..=100_000 {
+        if k % 10 == 0 {
+            writeln!(text, "{:?},{x:?}", f64::from(k / 10) / 50.0).unwrap();
+        }
+        x += h * (x - x.powi(3)) + h.sqrt() * size(x) * noise();
+    }
+    text
+}
+
+#[test]
+fn noise_that_depends_on_the_state_is_told_with_intervals_that_hold_and_constant_noise_is_not() {
+    let study = r#"
+[study]
+name = "bistable"
+[model]
+kind = "equations"
+outputs = [ { name = "x", value = "x" } ]
+[[model.states]]
+name = "x"
+rate = "a*x - b*x^3"
+[infer]
+parameters = ["a", "b"]
+[[records]]
+name = "path"
+file = "data.csv"
+channels = [ { column = "x", output = "x" } ]
+"#;
+    let steady = infer(folder(study, &bistable(|_| 0.6)).path(), "out", "2");
+    assert_eq!(said(&steady, "not constant"), Vec::<&str>::new());
+    assert_eq!((&steady["noise_varies"], &steady["robust"]), (&Value::Null, &Value::Null));
+    let dir = folder(study, &bistable(|x| 0.2 + 0.6 * x.abs()));
+    let found = infer(dir.path(), "out", "2");
+    let told = said(&found, "the noise is not constant: that of x is ");
+    assert_eq!(told.len(), 1, "{found}");
+    assert!(told[0].contains(" times as large at x = ") && told[0].contains("log(x)"), "{told:?}");
+    let varies = &found["noise_varies"][0];
+    let [from, to] = [0, 1].map(|k| varies["at"][k].as_f64().unwrap());
+    let ratio = varies["ratio"].as_f64().unwrap() / (0.2 + 0.6 * to.abs()) * (0.2 + 0.6 * from.abs());
+    assert!((0.8..1.25).contains(&ratio), "{varies}");
+    assert!(found["conditional_on"].as_str().unwrap().contains("white, of any size in each step"));
+    // Without what the noise moves them by they are half of that.
+    for name in ["a", "b"] {
+        let [estimate, sd] = value(&found, name);
+        assert!((estimate - 1.0).abs() < 3.0 * sd && sd < 0.25, "{name}: {estimate} ± {sd}");
+    }
+    let one = infer(dir.path(), "one", "1");
+    assert_eq!(one, found, "the same bytes, however many make the sums");
+    let arguments = ["forecast", "out", "--until", "2010", "--members", "20", "--json"];
+    let (code, forecast, stderr) = output(starlings().current_dir(dir.path()).args(arguments));
+    assert_eq!(code, 0, "{stderr}");
+    assert!(forecast.contains("the noise of x is not constant"), "{forecast}");
+    let page = std::fs::read_to_string(dir.path().join("out/report.html")).unwrap();
+    assert!(page.contains("the noise is not constant"), "the page warns too");
 }

@@ -4,13 +4,15 @@
 
 use nalgebra::{DMatrix, DVector};
 use starlings_estimators::inference::{
-    Coefficient, Diffusion, Extrapolated, Fit, InferenceError, NoiseCheck, Posterior, Prior, Strength,
-    Structure, Sums, Verdict, extrapolate, noise_checks,
+    Basis, Diffusion, Estimate, Extrapolated, Fit, InferenceError, NoiseCheck, Posterior, Prior, Strength,
+    Structure, Sums, extrapolate,
 };
 use starlings_study::infer_choice::{DiffusionChoice, InferChoice, MeasuredChoice};
 
 use crate::blocks::Cut;
 use crate::error::InferError;
+use crate::fitted::{Fitted, Given};
+use crate::gather::Gathered;
 use crate::hidden;
 use crate::progress::Teller;
 use crate::result::{CoefficientFound, DiffusionFound, LEVEL, RichardsonFound};
@@ -30,58 +32,6 @@ pub(crate) fn fit(choice: &InferChoice, structure: &Structure) -> Result<Fit, In
     let sd: Vec<f64> = names().map(|name| prior(name).map_or(f64::INFINITY, |(_, _, sd)| *sd)).collect();
     let fit = Fit::new(form, structure.n_coefficient());
     Ok(Fit { prefactor: choice.prefactor, prior: Prior::independent(&mean, &sd)?, ..fit })
-}
-
-/// The posterior of sums, freed of errors of the measurement where the residuals show them and the study leaves it to them.
-pub(crate) struct Fitted {
-    pub(crate) posterior: Posterior,
-    pub(crate) checks: Vec<NoiseCheck>,
-    /// Whether errors of the measurement were taken out of the noise.
-    pub(crate) lag_corrected: bool,
-}
-
-impl Fitted {
-    /// Fits; the noise settles from that of an `earlier` posterior where there is one.
-    pub(crate) fn of(
-        choice: &InferChoice,
-        fit: &Fit,
-        structure: &Structure,
-        sums: &Sums,
-        earlier: Option<&Posterior>,
-    ) -> Result<Self, InferenceError> {
-        if choice.priors.is_empty() {
-            enough(sums, structure)?;
-        }
-        let mut posterior = match earlier {
-            Some(earlier) => fit.update(sums, structure, earlier)?,
-            None => fit.posterior(sums, structure)?,
-        };
-        let checks = if sums.n_pair() > 0 { noise_checks(sums, structure, &posterior)? } else { Vec::new() };
-        let matters = checks.iter().any(|check| check.verdict == Verdict::Matters);
-        let is_auto = choice.measured == MeasuredChoice::Auto;
-        // What interpolation takes out of single steps, neighbouring ones have together.
-        let mut lag_corrected = (matters && is_auto) || choice.resample;
-        let freed = Fit { lag_corrected: true, ..fit.clone() };
-        if lag_corrected {
-            posterior = freed.posterior(sums, structure)?;
-        } else if is_auto && checks.iter().any(NoiseCheck::is_sure) {
-            // A long recording knows its coefficients so well that small errors matter too.
-            let without = freed.posterior(sums, structure).ok();
-            if let Some(without) = without.filter(|without| is_moved(&posterior, without)) {
-                (posterior, lag_corrected) = (without, true);
-            }
-        }
-        Ok(Self { posterior, checks, lag_corrected })
-    }
-}
-
-/// Part of its standard deviation by which a coefficient is moved by small errors of the measurement where they count.
-const MOVED: f64 = 0.5;
-
-/// Whether a coefficient moves by much of its standard deviation from one posterior to the other.
-fn is_moved(from: &Posterior, to: &Posterior) -> bool {
-    let values = from.estimates.iter().zip(&to.estimates).filter_map(|(a, b)| a.value.zip(b.value));
-    values.into_iter().any(|(a, b)| (a.mean - b.mean).abs() > MOVED * a.sd)
 }
 
 /// A matrix row by row.
@@ -122,20 +72,23 @@ pub(crate) struct Answer {
     pub(crate) extrapolated: Option<Extrapolated>,
     /// What went less well than was asked for.
     pub(crate) doubts: Vec<String>,
+    /// The estimates of constant noise, where those of the posterior hold for noise of any size.
+    constant: Option<Vec<Estimate>>,
 }
 
 impl Answer {
-    /// The posterior from sums by level.
+    /// The posterior from what recordings add up to.
     pub(crate) fn of(
         choice: &InferChoice,
         fit: &Fit,
         structure: &Structure,
-        levels: &[Sums],
+        (basis, gathered): (&Basis, &Gathered),
     ) -> Result<Self, InferError> {
+        let Gathered { levels, pairs, .. } = gathered;
         let Some(sums) = levels.first() else {
             return Err(InferError::Setting("no block of any recording was summed".to_owned()));
         };
-        let fitted = Fitted::of(choice, fit, structure, sums, None);
+        let fitted = Fitted::of(choice, fit, structure, sums, Given::Recording(basis, pairs));
         let Fitted { posterior, checks, lag_corrected } =
             fitted.map_err(|error| hidden::told(error, sums, structure))?;
         let fit = Fit { lag_corrected, ..fit.clone() };
@@ -143,7 +96,7 @@ impl Answer {
             Ok(extrapolated) => (extrapolated, Vec::new()),
             Err(doubt) => (None, vec![doubt]),
         };
-        Ok(Self { posterior, checks, lag_corrected, extrapolated, doubts })
+        Ok(Self { posterior, checks, lag_corrected, extrapolated, doubts, constant: None })
     }
 
     /// The posterior from a smoothed path, where the standard deviation of the measurement is known. The recording as it was measured
@@ -156,7 +109,9 @@ impl Answer {
         teller: &mut Teller<'_>,
     ) -> Result<Self, InferError> {
         let Asked { choice, question, fit, .. } = asked;
-        let checks = match levels.first().map(|sums| Fitted::of(choice, fit, &question.structure, sums, None))
+        let checks = match levels
+            .first()
+            .map(|sums| Fitted::of(choice, fit, &question.structure, sums, Given::Earlier(None)))
         {
             Some(Ok(raw)) => raw.checks,
             None
@@ -167,7 +122,30 @@ impl Answer {
         };
         let found = smoothed(question, fit, &choice.records, cut, sd, teller)?;
         let doubts = not_converged(found.converged, found.log_likelihood.len()).into_iter().collect();
-        Ok(Self { posterior: found.posterior, checks, lag_corrected: false, extrapolated: None, doubts })
+        let posterior = found.posterior;
+        Ok(Self { posterior, checks, lag_corrected: false, extrapolated: None, doubts, constant: None })
+    }
+
+    /// Takes a posterior that holds for noise of any size, where there is one.
+    pub(crate) fn take_robust(&mut self, robust: Option<Posterior>) {
+        if let Some(robust) = robust {
+            self.constant = Some(std::mem::replace(&mut self.posterior, robust).estimates);
+        }
+    }
+
+    /// How many times as wide as of constant noise the interval of a coefficient is; 1 where it is that.
+    pub(crate) fn widening(&self, name: &str) -> f64 {
+        let sd = |estimates: &[Estimate]| estimates.iter().find(|e| e.name == name)?.value.map(|v| v.sd);
+        let constant = self.constant.as_deref().and_then(sd);
+        constant.zip(sd(&self.posterior.estimates)).map_or(1.0, |(constant, sd)| sd / constant)
+    }
+
+    /// The least and the most of that over the coefficients; `None` where the intervals are those of constant noise.
+    pub(crate) fn widened(&self) -> Option<[f64; 2]> {
+        let estimates = self.constant.as_deref()?.iter().filter(|estimate| estimate.value.is_some());
+        let all: Vec<f64> = estimates.map(|estimate| self.widening(&estimate.name)).collect();
+        let most = all.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        Some([all.iter().copied().fold(f64::INFINITY, f64::min), most])
     }
 
     /// Means of the coefficients that have a value, at no step where they were extrapolated.
@@ -247,17 +225,4 @@ fn to_no_step(
         all.push(found.map_err(|error| missing(&format!("at steps of {}h ", 2 << k), &error))?);
     }
     extrapolate(&all, None).map(Some).map_err(|error| missing("between steps of h, 2h and 4h ", &error))
-}
-
-/// Whether there are more steps than unknowns in every equation; fewer look like terms that cannot be told apart.
-fn enough(sums: &Sums, structure: &Structure) -> Result<(), InferenceError> {
-    for (l, equation) in structure.equations().iter().enumerate() {
-        let enters = |c: &&Coefficient| c.places.iter().any(|place| place.equation == l);
-        let n_unknown = structure.coefficients().iter().filter(enters).count();
-        if sums.n_step() <= n_unknown as u64 {
-            let equation = equation.clone();
-            return Err(InferenceError::TooFew { n_step: sums.n_step(), n_unknown, equation });
-        }
-    }
-    Ok(())
 }

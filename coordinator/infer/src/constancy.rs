@@ -5,6 +5,8 @@
 
 use starlings_estimators::inference::{Fit, InferenceError, Seam, Structure, Sums, most_changed};
 
+use crate::answer::Answer;
+
 /// Stretches at most: two of them are made one where there would be more.
 const MOST: usize = 16;
 /// Probability of telling a change of recordings that have none.
@@ -41,6 +43,14 @@ pub(crate) struct Changed {
     pub(crate) name: String,
     pub(crate) before: [f64; 2],
     pub(crate) after: [f64; 2],
+}
+
+impl Changed {
+    /// Whether the change shows beside intervals that hold for noise of any size, too, where the answer has these.
+    pub(crate) fn shows(&self, answer: &Answer) -> bool {
+        let Self { name, before: [before, sd_before], after: [after, sd_after], .. } = self;
+        (before - after).abs() > SHOWS * sd_before.hypot(*sd_after) * answer.widening(name).max(1.0)
+    }
 }
 
 impl Stretches {

@@ -6,7 +6,7 @@
 
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
-use starlings_estimators::inference::{InferenceError, Sums};
+use starlings_estimators::inference::{InferenceError, Pairs, Sums};
 use starlings_fleet::{Fleet, Outcome, SetupId};
 use starlings_models::{Job, Setup};
 use starlings_study::infer_choice::InferRecord;
@@ -56,6 +56,8 @@ pub(crate) struct Gathered {
     pub(crate) spans: Vec<[f64; 2]>,
     /// The sampling step's sums once more, by stretches.
     pub(crate) stretches: Stretches,
+    /// A sample of its steps.
+    pub(crate) pairs: Pairs,
     record: usize,
 }
 
@@ -121,6 +123,7 @@ impl Work<'_> {
             steps: vec![0; self.records.len()],
             spans: vec![[f64::NAN; 2]; self.records.len()],
             stretches: Stretches::default(),
+            pairs: Pairs::new(self.question.basis.n_channel()),
             record: 0,
         }
     }
@@ -221,7 +224,7 @@ impl Work<'_> {
         let name = || self.records[record].name.clone();
         let found = outcome.result.map_err(|failure| InferError::Block { record: name(), failure })?;
         let answer = answer_of(self.question, self.cut.step, self.levels, &found.state)?;
-        let BlockAnswer { levels, span } = answer.map_err(|fault| match fault {
+        let BlockAnswer { levels, span, pairs } = answer.map_err(|fault| match fault {
             Fault::Unread => InferError::Unread,
             Fault::Row(error) => InferError::Row { record, error },
         })?;
@@ -235,6 +238,7 @@ impl Work<'_> {
         if let Some(sums) = levels.first().filter(|sums| sums.n_step() > 0) {
             gathered.stretches.add(sums, record, span[0])?;
         }
+        gathered.pairs.merge(&pairs)?;
         gathered.record = record;
         gathered.n_block += 1;
         gathered.steps[record] += levels.first().map_or(0, Sums::n_step);

@@ -9,9 +9,11 @@
 //! | `convergence` | the estimate after each power of two of blocks |
 //! | `smoothed` | the same from a smoothed path, where the measurement's noise is known |
 //! | `hidden`, `coarse` | whether errors of the measurement, or the recording's steps, are in the way |
+//! | `doubts`, `varying`, `constancy` | what else is doubtful of a recording: noise that is not constant, coefficients that change |
 //! | `missing` | which terms the drift lacks, among candidates |
 //! | [`explained`](mod@explained) | what was found of missing terms as an explanation |
 //! | [`reduced`] | a model with fewer unknowns than coefficients |
+//! | `fitted` | a fit, with what its residuals say of the measurement |
 //! | [`result`], `answer`, `words` | the tables with intervals, and what is said of them |
 //! | [`follow`](mod@follow) | a recording that is still written: estimates and alarms as it arrives |
 //! | [`forecast`](mod@forecast) | an ensemble of what comes next, drawn from the posterior |
@@ -25,10 +27,12 @@ mod blocks;
 mod coarse;
 mod constancy;
 mod convergence;
+mod doubts;
 pub mod error;
 mod even_step;
 pub mod explained;
 mod file_blocks;
+mod fitted;
 pub mod follow;
 pub mod forecast;
 mod gather;
@@ -43,6 +47,7 @@ pub mod result;
 mod rows;
 pub mod run;
 mod smoothed;
+mod varying;
 mod words;
 
 pub use error::InferError;

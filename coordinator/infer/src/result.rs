@@ -39,6 +39,12 @@ pub struct Inference {
     pub diffusion: DiffusionFound,
     /// What the residuals of neighbouring steps say of errors of the measurement.
     pub noise_checks: Vec<NoiseCheck>,
+    /// Equations whose noise is not constant.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub noise_varies: Vec<NoiseVaries>,
+    /// Whether the intervals of the coefficients hold for noise of any size in each step.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub robust: bool,
     /// The extrapolation to no step, where it was asked for.
     pub richardson: Option<RichardsonFound>,
     /// The reduced model, where there is one.
@@ -110,6 +116,23 @@ pub struct DiffusionFound {
     /// Standard deviation of the measurement, where it was given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub measured_sd: Option<f64>,
+}
+
+/// Noise that is not constant.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct NoiseVaries {
+    /// The equation.
+    pub equation: String,
+    /// The state or input with which it varies most; `None` for the course of the recordings.
+    pub with: Option<String>,
+    /// Where it is smallest and where it is largest: values of that, or shares of all rows that lie before.
+    pub at: [f64; 2],
+    /// Standard deviation at the second over that at the first.
+    pub ratio: f64,
+    /// N R² of the regression that shows it, with two degrees of freedom.
+    pub chi_squared: f64,
+    /// Probability, at most, of as much in any equation by constant noise.
+    pub by_chance: f64,
 }
 
 /// The extrapolation to no step.

@@ -11,9 +11,8 @@ use starlings_sums::Question;
 
 use crate::answer::{Answer, fit};
 use crate::blocks::{Cut, Start, start};
-use crate::coarse::{Coarse, coarse};
-use crate::constancy::Changed;
 use crate::convergence::Convergence;
+use crate::doubts::Doubts;
 use crate::error::InferError;
 use crate::file_blocks::files;
 use crate::gather::{Gathered, Source, Work};
@@ -67,23 +66,16 @@ pub fn infer(
     let mut teller = Teller::new(choice, cut, at, watch);
     let (gathered, convergence) = gathered(&asked, &choice.records, cut, fleet, (reader, &mut teller))?;
     let structure = &asked.question.structure;
-    let answer = match choice.measured {
+    let mut answer = match choice.measured {
         MeasuredChoice::Known(sd) => Answer::smoothed(&asked, cut, sd, &gathered.levels, &mut teller)?,
-        _ => Answer::of(choice, &asked.fit, structure, &gathered.levels)?,
+        _ => Answer::of(choice, &asked.fit, structure, (&asked.question.basis, &gathered))?,
     };
     let fit = Fit { lag_corrected: answer.lag_corrected, ..asked.fit.clone() };
     let missing = missing(&asked, &fit, &gathered, cut, fleet, (reader, &mut teller))?;
     teller.posterior();
     let convergence = convergence.finish(&fit, structure, &gathered);
-    let sums = gathered.levels.first();
-    let coarse = sums.and_then(|sums| coarse(&asked, &fit, &answer, sums, cut, at));
-    // Rows that were interpolated or hold large errors share them, which the test of a change takes for independent.
-    let is_plain = !choice.resample
-        && choice.prefactor
-        && !answer.lag_corrected
-        && !matches!(choice.measured, MeasuredChoice::Known(_));
-    let changed = is_plain.then(|| gathered.stretches.changed(&fit, structure)).flatten();
-    let beside = Beside { convergence, missing, coarse, changed };
+    let doubts = Doubts::of(&asked, &fit, &mut answer, &gathered, (cut, at));
+    let beside = Beside { convergence, missing, doubts };
     told_of(study, &asked, &gathered, &answer, cut, beside)
 }
 
@@ -228,8 +220,7 @@ fn cut(choice: &InferChoice, asked: &Asked<'_>, at: Start) -> Cut {
 struct Beside {
     convergence: Vec<Converging>,
     missing: Option<MissingFound>,
-    coarse: Option<Coarse>,
-    changed: Option<Changed>,
+    doubts: Doubts,
 }
 
 /// The tables.
@@ -242,7 +233,7 @@ fn told_of(
     beside: Beside,
 ) -> Result<Inference, InferError> {
     let choice = asked.choice;
-    let Beside { convergence, missing, coarse, changed } = beside;
+    let Beside { convergence, missing, doubts } = beside;
     let structure = &asked.question.structure;
     let means = answer.means();
     let reduced =
@@ -252,9 +243,7 @@ fn told_of(
     let n_step = gathered.levels.first().map_or(0, Sums::n_step);
     let records = choice.records.iter().enumerate();
     let mut warnings = words::warnings(choice, answer, reduced.as_ref(), missing.as_ref());
-    warnings.extend(coarse.map(|coarse| words::of_steps(&coarse, cut.step, &study.time_unit)));
-    let name = |changed: &Changed| choice.records[changed.record].name.clone();
-    warnings.extend(changed.map(|changed| words::of_change(&changed, &name(&changed), &study.time_unit)));
+    warnings.extend(doubts.said(choice, answer, cut, &study.time_unit));
     Ok(Inference {
         study: study.name.clone(),
         verdict: words::verdict(n_step, &coefficients, reduced.as_ref(), missing.as_ref()),
@@ -275,6 +264,8 @@ fn told_of(
         covariance: answer.covariance(),
         diffusion: answer.diffusion(choice),
         noise_checks: answer.checks.clone(),
+        noise_varies: doubts.varies,
+        robust: answer.widened().is_some(),
         richardson: answer.richardson(),
         reduced,
         missing,

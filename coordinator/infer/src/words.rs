@@ -89,13 +89,21 @@ pub(crate) fn conditional_on(choice: &InferChoice, answer: &Answer) -> String {
         Some(_) => "extrapolated to no sampling step",
         None => "the error of the sampling step is not in them",
     };
-    format!("90 % intervals, given that {drift} and that the noise is white, {measured}; {step}")
+    let white = if answer.widened().is_some() {
+        "white, of any size in each step (the drift is that of Itô's equation)"
+    } else {
+        "white"
+    };
+    format!("90 % intervals, given that {drift} and that the noise is {white}, {measured}; {step}")
 }
 
 /// In what the estimates on the way differ from the table.
 pub(crate) fn convergence_of(choice: &InferChoice, answer: &Answer) -> Option<String> {
     if let MeasuredChoice::Known(_) = choice.measured {
         return Some("estimates from the recording as it was measured, before smoothing".to_owned());
+    }
+    if answer.widened().is_some() {
+        return Some("estimates that take the noise for constant".to_owned());
     }
     let extrapolated = answer.extrapolated.as_ref();
     extrapolated.map(|_| "estimates at the sampling step, before the extrapolation to none".to_owned())

@@ -103,6 +103,34 @@ impl Basis {
         }
     }
 
+    /// Values of all functions for one step, each by its rule, from the times and the samples at its start and its mid-point.
+    pub(crate) fn step_values(
+        &self,
+        [left, mid]: [f64; 2],
+        [start, centre]: [&[f64]; 2],
+        values: &mut [f64],
+    ) {
+        for part in &self.parts {
+            let (time, x) = match part.rule {
+                Rule::LeftPoint => (left, start),
+                Rule::MidPoint => (mid, centre),
+            };
+            part.functions.values(time, x, &mut values[part.first..part.first + part.n]);
+        }
+    }
+
+    /// Slopes of all functions for one step, `slopes[b * L + l]`, from the time and the sample at its mid-point; zero for those taken at
+    /// the left point, which what moves in the step does not reach.
+    pub(crate) fn step_slopes(&self, time: f64, mid: &[f64], slopes: &mut [f64]) {
+        for part in &self.parts {
+            let slopes = &mut slopes[part.first * self.n_state..(part.first + part.n) * self.n_state];
+            match part.rule {
+                Rule::LeftPoint => slopes.fill(0.0),
+                Rule::MidPoint => part.functions.slopes(time, mid, slopes),
+            }
+        }
+    }
+
     /// Columns of all functions for a block of steps, and their slopes added to `sums`.
     pub(crate) fn evaluate(
         &self,

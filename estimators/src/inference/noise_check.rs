@@ -38,6 +38,13 @@ impl NoiseCheck {
     pub fn is_sure(&self) -> bool {
         self.ratio > normal(PRESENT) * self.sd
     }
+
+    /// The same with a sampling error that is so many times as large, as where the noise is not constant.
+    #[must_use]
+    pub fn widened(self, times: f64) -> Self {
+        let sd = self.sd * times;
+        Self { sd, verdict: verdict(self.ratio, sd), ..self }
+    }
 }
 
 /// What residuals at lag one say, with 95 % probability.
@@ -73,16 +80,19 @@ pub fn noise_checks(
         let shared = -lagged[(l, l)] / pairs;
         let ratio = shared / (squares[(l, l)] / n);
         let sd = bartlett_sd(ratio, pairs);
-        let margin = normal(SURE) * sd;
-        let verdict = match ratio - MATTERS {
-            above if above > margin => Verdict::Matters,
-            above if above < -margin => Verdict::Absent,
-            _ => Verdict::Unclear,
-        };
         let measured = shared * sums.step() * sums.step();
-        NoiseCheck { equation: equation.clone(), ratio, sd, measured, verdict }
+        NoiseCheck { equation: equation.clone(), ratio, sd, measured, verdict: verdict(ratio, sd) }
     };
     Ok(structure.equations().iter().enumerate().map(check).collect())
+}
+
+fn verdict(ratio: f64, sd: f64) -> Verdict {
+    let margin = normal(SURE) * sd;
+    match ratio - MATTERS {
+        above if above > margin => Verdict::Matters,
+        above if above < -margin => Verdict::Absent,
+        _ => Verdict::Unclear,
+    }
 }
 
 /// Standard deviation of a lag-one autocorrelation from so many pairs, of a moving average of order one (Bartlett, Journal of the Royal

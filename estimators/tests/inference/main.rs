@@ -22,3 +22,4 @@ mod mixing;
 mod motor;
 mod properties;
 mod tanks;
+mod varying;

@@ -1,9 +1,9 @@
-//! What a job answers, as numbers: its sums, or a fault of the recording.
+//! What a job answers, as numbers: its sums and a few pairs of its steps, or a fault of the recording.
 //!
 //! A fault of the recording is the same wherever the job runs. It is an answer and no failure, so that nobody makes the job again, and
 //! it is told with its row. Next file to read: [`super::block_sums`].
 
-use starlings_estimators::inference::{InferenceError, Sums};
+use starlings_estimators::inference::{InferenceError, Pairs, Sums};
 
 use crate::question::Question;
 
@@ -17,6 +17,8 @@ pub struct BlockAnswer {
     pub levels: Vec<Sums>,
     /// Times at which its first step starts and its last one ends.
     pub span: [f64; 2],
+    /// Pairs of its steps.
+    pub pairs: Pairs,
 }
 
 /// Why a block has no sums.
@@ -43,9 +45,10 @@ enum Kind {
 const KINDS: [Kind; 5] =
     [Kind::Unread, Kind::NonFinite, Kind::NotIncreasing, Kind::TimeJump, Kind::NonUniform];
 
-/// The numbers of sums, level after level, and of the span.
-pub(crate) fn sums_values(levels: &[Sums], span: [f64; 2]) -> Vec<f64> {
-    levels.iter().flat_map(Sums::to_values).chain(span).collect()
+/// The numbers of sums, level after level, of the span and of pairs.
+pub(crate) fn sums_values(levels: &[Sums], span: [f64; 2], pairs: &Pairs) -> Vec<f64> {
+    let pairs = pairs.to_values().iter().copied();
+    levels.iter().flat_map(Sums::to_values).chain(span).chain(pairs).collect()
 }
 
 /// The numbers of a fault; an error that speaks of no row is none.
@@ -73,7 +76,7 @@ pub(crate) fn fault_values(question: &Question, fault: &Fault) -> Option<Vec<f64
 /// What the numbers of a job say.
 ///
 /// # Errors
-/// As for [`Sums::from_values`]: numbers of another length, or that are neither sums nor a fault.
+/// As for [`Sums::from_values`] and [`Pairs::from_values`]: too few numbers, or such that are neither sums and pairs nor a fault.
 pub fn answer_of(
     question: &Question,
     step: f64,
@@ -85,9 +88,11 @@ pub fn answer_of(
     }
     let n = Sums::n_value(&question.basis);
     let (expected, got) = (n * levels as usize + 2, values.len());
-    if expected != got {
+    if expected > got {
         return Err(InferenceError::Shape { what: "numbers of block sums", expected, got });
     }
+    let (values, pairs) = values.split_at(expected);
+    let pairs = Pairs::from_values(&question.basis, pairs)?;
     let (sums, span) = values.split_at(expected - 2);
     let level = |(k, values)| Sums::from_values(&question.basis, step * f64::from(1_u32 << k), values);
     let levels = sums.chunks_exact(n).enumerate().map(level).collect::<Result<_, _>>()?;
@@ -95,7 +100,7 @@ pub fn answer_of(
     if !(span[0] <= span[1] && span.iter().all(|end| end.is_finite())) {
         return Err(InferenceError::Damaged { what: "the times of a block" });
     }
-    Ok(Ok(BlockAnswer { levels, span }))
+    Ok(Ok(BlockAnswer { levels, span, pairs }))
 }
 
 fn fault_of(question: &Question, step: f64, values: &[f64]) -> Result<Fault, InferenceError> {

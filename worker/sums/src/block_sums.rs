@@ -6,7 +6,7 @@
 
 use std::sync::Arc;
 
-use starlings_estimators::inference::{InferenceError, Stream, Sums};
+use starlings_estimators::inference::{InferenceError, Pairs, Stream, Sums};
 use starlings_models::{
     BuildSetup, Forward, Job, ModelFailure, ParticleError, Prediction, Setup, Spec, SumsFile, Window,
 };
@@ -93,7 +93,10 @@ impl BlockSums {
     ) -> Result<Vec<f64>, InferenceError> {
         let found = self.sums(times, rows, n_step).map_err(|error| moved(error, |row| row + first));
         match found {
-            Ok(levels) => Ok(sums_values(&levels, [times[0], times[n_step]])),
+            Ok(levels) => {
+                let pairs = Pairs::of_block(times, rows, self.question.basis.n_channel(), n_step);
+                Ok(sums_values(&levels, [times[0], times[n_step]], &pairs))
+            }
             Err(error) => fault_values(&self.question, &Fault::Row(error.clone())).ok_or(error),
         }
     }

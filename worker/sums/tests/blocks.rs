@@ -95,6 +95,13 @@ fn numbers_that_are_no_sums_are_refused() {
     let values = [summed(&setup, 0, 300, 0, 300)[0].to_values(), vec![0.0, 30.0]].concat();
     let refused = |values: &[f64]| answer_of(&question, STEP, 1, values).unwrap_err();
     assert!(matches!(refused(&values[1..]), InferenceError::Shape { .. }));
+    for pairs in [vec![0.5; 6], vec![f64::NAN; 7]] {
+        let more = [values.clone(), pairs].concat();
+        assert!(
+            matches!(refused(&more), InferenceError::Damaged { .. }),
+            "no time and three rows of two values"
+        );
+    }
     let ends = values.len() - 1;
     for fault in [[-1.0, 9.0, 0.0, 0.0, 0.0], [-1.0, 1.0, -3.0, 0.0, 0.0], [-1.0, 1.0, 3.0, 0.5, 0.0]] {
         assert!(matches!(refused(&fault), InferenceError::Damaged { .. }), "{fault:?}");

@@ -10,8 +10,8 @@ use starlings_estimators::inference::{
 
 use super::line::{self, Line};
 use super::state::{self, Saved};
-use crate::answer::Fitted;
 use crate::error::InferError;
+use crate::fitted::{Fitted, Given};
 use crate::run::Asked;
 
 /// The estimate and the detector.
@@ -99,7 +99,7 @@ impl<'a> Follower<'a> {
     fn fitted(&self) -> Result<Option<Fitted>, InferenceError> {
         let Asked { choice, fit, question, .. } = self.asked;
         let Some(sums) = self.window.sums() else { return Ok(None) };
-        Fitted::of(choice, fit, &question.structure, &sums, self.posterior.as_ref()).map(Some)
+        Fitted::of(choice, fit, &question.structure, &sums, Given::Earlier(self.posterior.as_ref())).map(Some)
     }
 
     /// What was found. Where too little is known yet it is nothing; what more rows alone do not mend stands in the line.

@@ -76,6 +76,14 @@ impl Known {
                 named.join(", ")
             ));
         }
+        let varies: Vec<&str> = found.noise_varies.iter().map(|of| of.equation.as_str()).collect();
+        if !varies.is_empty() {
+            warnings.push(format!(
+                "the inference found that the noise of {} is not constant, which that of members is: they spread too little where it is \
+                 larger than its mean",
+                varies.join(", ")
+            ));
+        }
         Ok(Self { names, draws, step: found.step, measured, last: None, warnings })
     }
 

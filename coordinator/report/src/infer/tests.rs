@@ -75,6 +75,8 @@ fn sample() -> Inference {
             measured_sd: None,
         },
         noise_checks: Vec::new(),
+        noise_varies: Vec::new(),
+        robust: false,
         richardson: None,
         reduced: Some(ReducedFound {
             unknowns: vec![UnknownFound {

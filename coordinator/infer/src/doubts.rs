@@ -1,0 +1,53 @@
+//! What is doubtful of a recording as a whole: steps that are coarse, noise that is not constant, coefficients that change.
+//!
+//! Next files to read: `coarse.rs`, `varying.rs`, `constancy.rs`.
+
+use starlings_estimators::inference::Fit;
+use starlings_study::infer_choice::{InferChoice, MeasuredChoice};
+
+use crate::answer::Answer;
+use crate::blocks::{Cut, Start};
+use crate::coarse::{Coarse, coarse};
+use crate::constancy::Changed;
+use crate::gather::Gathered;
+use crate::result::NoiseVaries;
+use crate::run::Asked;
+use crate::varying::{said, varies};
+use crate::words;
+
+/// What was found.
+pub(crate) struct Doubts {
+    coarse: Option<Coarse>,
+    pub(crate) varies: Vec<NoiseVaries>,
+    changed: Option<Changed>,
+}
+
+impl Doubts {
+    /// Looks at the recordings that an answer is of. Its intervals hold noise that varies from here on.
+    pub(crate) fn of(
+        asked: &Asked<'_>,
+        fit: &Fit,
+        answer: &mut Answer,
+        gathered: &Gathered,
+        (cut, at): (Cut, Start),
+    ) -> Self {
+        let (choice, structure) = (asked.choice, &asked.question.structure);
+        let coarse = gathered.levels.first().and_then(|sums| coarse(asked, fit, answer, sums, cut, at));
+        let varies = varies(asked, fit, answer, gathered, coarse.is_some());
+        // Rows that were interpolated or hold large errors share them, which the test of a change takes for independent.
+        let is_plain = !choice.resample
+            && choice.prefactor
+            && !answer.lag_corrected
+            && !matches!(choice.measured, MeasuredChoice::Known(_));
+        let changed = is_plain.then(|| gathered.stretches.changed(fit, structure)).flatten();
+        Self { coarse, varies, changed: changed.filter(|changed| changed.shows(answer)) }
+    }
+
+    /// What is said of it; `cut` has the step.
+    pub(crate) fn said(&self, choice: &InferChoice, answer: &Answer, cut: Cut, unit: &str) -> Vec<String> {
+        let coarse = self.coarse.as_ref().map(|coarse| words::of_steps(coarse, cut.step, unit));
+        let name = |changed: &Changed| choice.records[changed.record].name.clone();
+        let changed = self.changed.as_ref().map(|changed| words::of_change(changed, &name(changed), unit));
+        coarse.into_iter().chain(said(&self.varies, choice, answer)).chain(changed).collect()
+    }
+}

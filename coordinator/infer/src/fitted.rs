@@ -1,0 +1,106 @@
+//! A fit of sums, with what its residuals say of errors of the measurement.
+//!
+//! Next file to read: `answer.rs`.
+
+use starlings_estimators::inference::{
+    Basis, Coefficient, Fit, InferenceError, NoiseCheck, Pairs, Posterior, Structure, Sums, Verdict,
+    lag_spread, noise_checks, varying,
+};
+use starlings_study::infer_choice::{InferChoice, MeasuredChoice};
+
+use crate::varying::FALSE_ALARM;
+
+/// What there is beside sums.
+#[derive(Clone, Copy)]
+pub(crate) enum Given<'a> {
+    /// An earlier posterior, from whose noise that of this one settles.
+    Earlier(Option<&'a Posterior>),
+    /// Pairs of steps of the recordings.
+    Recording(&'a Basis, &'a Pairs),
+}
+
+/// The posterior of sums, freed of errors of the measurement where the residuals show them and the study leaves it to them.
+pub(crate) struct Fitted {
+    pub(crate) posterior: Posterior,
+    pub(crate) checks: Vec<NoiseCheck>,
+    /// Whether errors of the measurement were taken out of the noise.
+    pub(crate) lag_corrected: bool,
+}
+
+impl Fitted {
+    /// Fits.
+    pub(crate) fn of(
+        choice: &InferChoice,
+        fit: &Fit,
+        structure: &Structure,
+        sums: &Sums,
+        given: Given<'_>,
+    ) -> Result<Self, InferenceError> {
+        if choice.priors.is_empty() {
+            enough(sums, structure)?;
+        }
+        let mut posterior = match given {
+            Given::Earlier(Some(earlier)) => fit.update(sums, structure, earlier)?,
+            _ => fit.posterior(sums, structure)?,
+        };
+        let mut checks =
+            if sums.n_pair() > 0 { noise_checks(sums, structure, &posterior)? } else { Vec::new() };
+        if let Given::Recording(basis, pairs) = given
+            && checks.iter().any(|check| check.is_sure() || check.verdict == Verdict::Matters)
+        {
+            checks = if_any(checks, basis, pairs, &posterior, sums.step())?;
+        }
+        let matters = checks.iter().any(|check| check.verdict == Verdict::Matters);
+        let is_auto = choice.measured == MeasuredChoice::Auto;
+        // What interpolation takes out of single steps, neighbouring ones have together.
+        let mut lag_corrected = (matters && is_auto) || choice.resample;
+        let freed = Fit { lag_corrected: true, ..fit.clone() };
+        if lag_corrected {
+            posterior = freed.posterior(sums, structure)?;
+        } else if is_auto && checks.iter().any(|check| check.is_sure() || check.verdict == Verdict::Matters) {
+            // A long recording knows its coefficients so well that small errors matter too.
+            let without = freed.posterior(sums, structure).ok();
+            if let Some(without) = without.filter(|without| is_moved(&posterior, without)) {
+                (posterior, lag_corrected) = (without, true);
+            }
+        }
+        Ok(Self { posterior, checks, lag_corrected })
+    }
+}
+
+/// Part of its standard deviation by which a coefficient is moved by small errors of the measurement where they count.
+const MOVED: f64 = 0.5;
+
+/// Whether a coefficient moves by much of its standard deviation from one posterior to the other.
+fn is_moved(from: &Posterior, to: &Posterior) -> bool {
+    let values = from.estimates.iter().zip(&to.estimates).filter_map(|(a, b)| a.value.zip(b.value));
+    values.into_iter().any(|(a, b)| (a.mean - b.mean).abs() > MOVED * a.sd)
+}
+
+/// Checks of residuals at lag one, whose sampling error is larger where the noise is not constant.
+fn if_any(
+    checks: Vec<NoiseCheck>,
+    basis: &Basis,
+    pairs: &Pairs,
+    posterior: &Posterior,
+    step: f64,
+) -> Result<Vec<NoiseCheck>, InferenceError> {
+    if varying(pairs, basis, posterior.drift(), step, FALSE_ALARM)?.is_empty() {
+        return Ok(checks);
+    }
+    let spread = lag_spread(pairs, basis, posterior.drift(), step)?;
+    Ok(checks.into_iter().zip(spread).map(|(check, spread)| check.widened(spread)).collect())
+}
+
+/// Whether there are more steps than unknowns in every equation; fewer look like terms that cannot be told apart.
+fn enough(sums: &Sums, structure: &Structure) -> Result<(), InferenceError> {
+    for (l, equation) in structure.equations().iter().enumerate() {
+        let enters = |c: &&Coefficient| c.places.iter().any(|place| place.equation == l);
+        let n_unknown = structure.coefficients().iter().filter(enters).count();
+        if sums.n_step() <= n_unknown as u64 {
+            let equation = equation.clone();
+            return Err(InferenceError::TooFew { n_step: sums.n_step(), n_unknown, equation });
+        }
+    }
+    Ok(())
+}

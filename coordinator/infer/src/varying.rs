@@ -1,0 +1,103 @@
+//! Whether the noise has one size throughout, and intervals that hold where it has not.
+//!
+//! The test and the intervals are the estimators' (`estimators/src/inference/varying.rs` and `robust.rs` beside it), by pairs of steps that
+//! the blocks bring along. Next file to read: `doubts.rs`, which asks, and says what it finds beside other doubts.
+
+use starlings_estimators::inference::{Fit, Varying, Verdict, With, varying};
+use starlings_models::units::rounded;
+use starlings_study::infer_choice::{InferChoice, MeasuredChoice};
+
+use crate::answer::Answer;
+use crate::gather::Gathered;
+use crate::result::NoiseVaries;
+use crate::run::Asked;
+
+/// Probability of telling noise that varies in a recording in which it does not.
+pub(crate) const FALSE_ALARM: f64 = 1e-3;
+/// Ratio of noise up to which coarse steps, or errors of the measurement that matter, let it look as if it varied: of errors a drift of
+/// slope f' brings (f'h)²/2 of their own variance with it, which differs from state to state.
+const HIDDEN: f64 = 1.5;
+
+/// The equations whose noise varies. The answer's intervals hold that from here on where they can: not where errors of the
+/// measurement make neighbouring residuals one another's, or where the coefficients were extrapolated.
+pub(crate) fn varies(
+    asked: &Asked<'_>,
+    fit: &Fit,
+    answer: &mut Answer,
+    gathered: &Gathered,
+    is_coarse: bool,
+) -> Vec<NoiseVaries> {
+    let Asked { choice, question, .. } = asked;
+    let (Some(sums), pairs) = (gathered.levels.first(), &gathered.pairs) else { return Vec::new() };
+    if choice.resample || matches!(choice.measured, MeasuredChoice::Known(_)) {
+        return Vec::new();
+    }
+    let is_noisy =
+        answer.lag_corrected || answer.checks.iter().any(|check| check.verdict == Verdict::Matters);
+    let (basis, structure) = (&question.basis, &question.structure);
+    let found = varying(pairs, basis, answer.posterior.drift(), sums.step(), FALSE_ALARM);
+    let is_told = |found: &Varying| found.ratio > HIDDEN || !(is_coarse || is_noisy);
+    let told: Vec<Varying> = found.unwrap_or_default().into_iter().filter(is_told).collect();
+    if !told.is_empty() && !is_noisy && answer.extrapolated.is_none() {
+        let robust = fit.robust(&answer.posterior, pairs, (basis, structure), sums.step());
+        answer.take_robust(robust.ok());
+    }
+    let inputs = asked.setup.model.equations.iter().flat_map(|equations| &equations.inputs);
+    let names: Vec<&String> = structure.equations().iter().chain(inputs.map(|input| &input.name)).collect();
+    let one = |found: Varying| NoiseVaries {
+        equation: structure.equations()[found.equation].clone(),
+        with: match found.with {
+            With::Channel(channel) => names.get(channel).map(|name| (*name).clone()),
+            With::Course => None,
+        },
+        at: found.at,
+        ratio: found.ratio,
+        chi_squared: found.chi_squared,
+        by_chance: found.by_chance,
+    };
+    told.into_iter().map(one).collect()
+}
+
+/// What is said of it.
+pub(crate) fn said(varies: &[NoiseVaries], choice: &InferChoice, answer: &Answer) -> Option<String> {
+    let list: Vec<String> = varies.iter().map(one).collect();
+    if list.is_empty() {
+        return None;
+    }
+    let intervals = match answer.widened() {
+        Some([least, most]) => format!(
+            "the intervals of the coefficients allow for it, {} as wide as without, and coefficients of curved functions were freed of what \
+             it moves them by",
+            between(least, most)
+        ),
+        None => "the intervals of the coefficients take it for constant and hold the truth less often than they say, and coefficients \
+                 of curved functions are off"
+            .to_owned(),
+    };
+    let missing = if choice.missing.is_some() { ", χ² of missing terms" } else { "" };
+    Some(format!(
+        "the noise is not constant: {}; {intervals}; the noise that is told is its mean, and its interval{missing} and a forecast take it \
+         for constant: coefficients are sharper in a state in which it is (log(x) where it grows as x)",
+        list.join(", ")
+    ))
+}
+
+/// Where the noise of an equation is how large.
+fn one(found: &NoiseVaries) -> String {
+    let NoiseVaries { equation, at: [from, to], ratio, by_chance, .. } = found;
+    let chance = if *by_chance < 1e-9 { "less than 1e-9".to_owned() } else { format!("{by_chance:.0e}") };
+    let at = match &found.with {
+        Some(name) => format!("at {name} = {} as at {name} = {}", rounded(*to, 3), rounded(*from, 3)),
+        None => format!("after {:.0} % of the rows as after {:.0} %", 100.0 * to, 100.0 * from),
+    };
+    format!(
+        "that of {equation} is {} times as large {at} (by chance with probability {chance})",
+        rounded(*ratio, 2)
+    )
+}
+
+/// Two ratios as words.
+fn between(least: f64, most: f64) -> String {
+    let [least, most] = [rounded(least, 2), rounded(most, 2)];
+    if most > least { format!("{least} to {most} times") } else { format!("{most} times") }
+}

@@ -1,0 +1,201 @@
+//! Neighbouring steps of a recording, picked evenly over its length: a sample of constant size for what sums cannot say.
+//!
+//! A pair is three rows that follow one another. Every block gives a few of its own, and merging them in the order of the blocks thins
+//! them where they are too many, so that the sample depends on the blocks alone and not on who picked it. Within a block they lie a
+//! little beside equal distances, or what repeats in a recording could keep step with them. Read next: `varying.rs` and `robust.rs`, which
+//! ask it.
+
+use super::{Basis, InferenceError};
+
+/// Pairs of a block at most.
+const OF_BLOCK: usize = 512;
+/// Numbers of a block's pairs at most: a hundred and thirty kilobytes.
+const OF_BLOCK_NUMBERS: usize = 1 << 14;
+/// Pairs of a recording at most; between half as many and so many are left of more.
+const OF_ALL: usize = 1 << 14;
+/// Numbers of a recording's pairs at most: eight megabytes.
+const OF_ALL_NUMBERS: usize = 1 << 20;
+/// Rows of a pair.
+const ROWS: usize = 3;
+/// Fractional part of the golden ratio, whose multiples are spread evenly over one.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
+
+/// Pairs of neighbouring steps.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pairs {
+    n_channel: usize,
+    /// One in so many of those that were offered is kept.
+    stride: u64,
+    offered: u64,
+    /// The time of the first row and the values of all three, pair after pair.
+    values: Vec<f64>,
+}
+
+/// Two steps that follow one another.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Pair<'a> {
+    /// When the first one starts.
+    pub(crate) time: f64,
+    /// Values of the rows at which the first starts, both meet and the second ends, one after the other.
+    rows: &'a [f64],
+    n_channel: usize,
+}
+
+impl<'a> Pair<'a> {
+    /// Values of a row, 0 to 2.
+    pub(crate) fn row(&self, row: usize) -> &'a [f64] {
+        &self.rows[row * self.n_channel..][..self.n_channel]
+    }
+}
+
+impl Pairs {
+    /// No pairs, of rows of so many values.
+    pub fn new(n_channel: usize) -> Self {
+        Self { n_channel, stride: 1, offered: 0, values: Vec::new() }
+    }
+
+    /// Those of a block in which `n_step` steps start, from its times and its rows one after the other.
+    pub fn of_block(times: &[f64], rows: &[f64], n_channel: usize, n_step: usize) -> Self {
+        let mut pairs = Self::new(n_channel);
+        let n_row = times.len().min(rows.len() / n_channel.max(1));
+        let there = n_step.min(n_row.saturating_sub(1)) / 2;
+        let kept = there.min(OF_BLOCK).min(OF_BLOCK_NUMBERS / (1 + ROWS * n_channel));
+        for k in 0..kept {
+            let beside = if kept < there { (k as f64 * GOLDEN).fract() } else { 0.0 };
+            let row = 2 * (((k as f64 + beside) * there as f64 / kept as f64) as usize).min(there - 1);
+            pairs.values.push(times[row]);
+            pairs.values.extend_from_slice(&rows[row * n_channel..][..ROWS * n_channel]);
+        }
+        pairs.offered = kept as u64;
+        pairs
+    }
+
+    /// Adds those of the next block.
+    ///
+    /// # Errors
+    /// `Incompatible` with rows of another length.
+    pub fn merge(&mut self, block: &Self) -> Result<(), InferenceError> {
+        if self.n_channel != block.n_channel {
+            return Err(InferenceError::Incompatible { what: "their channels" });
+        }
+        for pair in block.values.chunks_exact(self.size()) {
+            if self.offered.is_multiple_of(self.stride) {
+                if self.n_pair() >= self.most() {
+                    self.halve();
+                }
+                // There is an even number of them, so that this one is in its turn after halving too.
+                self.values.extend_from_slice(pair);
+            }
+            self.offered += 1;
+        }
+        Ok(())
+    }
+
+    /// Pairs at most, an even number.
+    fn most(&self) -> usize {
+        OF_ALL.min(OF_ALL_NUMBERS / self.size() / 2 * 2).max(2)
+    }
+
+    fn halve(&mut self) {
+        let size = self.size();
+        let kept = self.values.chunks_exact(size).step_by(2).flatten().copied();
+        self.values = kept.collect();
+        self.stride *= 2;
+    }
+
+    fn size(&self) -> usize {
+        1 + ROWS * self.n_channel
+    }
+
+    /// Number of pairs.
+    pub fn n_pair(&self) -> usize {
+        self.values.len() / self.size()
+    }
+
+    /// Number of values of a row, states and inputs.
+    pub fn n_channel(&self) -> usize {
+        self.n_channel
+    }
+
+    /// The pairs, in the order of the blocks.
+    pub(crate) fn iter(&self) -> impl Iterator<Item = Pair<'_>> {
+        let n_channel = self.n_channel;
+        self.values.chunks_exact(self.size()).map(move |pair| Pair {
+            time: pair[0],
+            rows: &pair[1..],
+            n_channel,
+        })
+    }
+
+    /// The pairs of a block as numbers: the time and three rows of each.
+    pub fn to_values(&self) -> &[f64] {
+        &self.values
+    }
+
+    /// The pairs of a block from numbers that came from elsewhere.
+    ///
+    /// # Errors
+    /// `Damaged` where they are no pairs, more than a block has, or not finite.
+    pub fn from_values(basis: &Basis, values: &[f64]) -> Result<Self, InferenceError> {
+        let pairs = Self { values: values.to_vec(), ..Self::new(basis.n_channel()) };
+        let n = pairs.n_pair();
+        if n > OF_BLOCK || n * pairs.size() != values.len() || values.iter().any(|v| !v.is_finite()) {
+            return Err(InferenceError::Damaged { what: "the pairs of steps of a block" });
+        }
+        Ok(Self { offered: n as u64, ..pairs })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Pairs of a block of one channel that counts its rows from `first` on.
+    fn block(first: usize, n_step: usize) -> Pairs {
+        let rows: Vec<f64> = (first..=first + n_step).map(|k| k as f64).collect();
+        Pairs::of_block(&rows, &rows, 1, n_step)
+    }
+
+    fn starts(pairs: &Pairs) -> Vec<f64> {
+        pairs.iter().map(|pair| pair.time).collect()
+    }
+
+    #[test]
+    fn short_blocks_give_all_their_steps_and_long_ones_some_that_are_apart() {
+        assert_eq!(starts(&block(10, 7)), [10.0, 12.0, 14.0]);
+        assert_eq!(block(0, 1).n_pair() + block(0, 0).n_pair(), 0);
+        let long = block(0, 100_001);
+        assert_eq!(long.n_pair(), OF_BLOCK);
+        let apart: Vec<f64> = starts(&long).windows(2).map(|pair| pair[1] - pair[0]).collect();
+        assert!(apart.iter().all(|apart| (2.0..400.0).contains(apart)), "{apart:?}");
+        for pair in long.iter() {
+            let after: Vec<f64> = (0..ROWS).map(|k| pair.row(k)[0] - pair.time).collect();
+            assert_eq!(after, [0.0, 1.0, 2.0]);
+        }
+    }
+
+    #[test]
+    fn merged_blocks_are_thinned_evenly_and_never_more_than_a_sample() {
+        let mut all = Pairs::new(1);
+        for k in 0..100 {
+            all.merge(&block(k * 2000, 2000)).unwrap_or_else(|error| panic!("{error}"));
+            assert!(all.n_pair() <= OF_ALL);
+        }
+        assert!(all.n_pair() > OF_ALL / 2 - OF_BLOCK, "{}", all.n_pair());
+        let starts = starts(&all);
+        let halves = starts.iter().filter(|time| **time < 100_000.0).count() as f64 / starts.len() as f64;
+        assert!((halves - 0.5).abs() < 0.001, "{halves}");
+        assert!(all.merge(&Pairs::new(2)).is_err(), "rows of another length");
+    }
+
+    #[test]
+    fn numbers_that_are_no_pairs_are_refused() {
+        let basis = Basis::new(1, 0);
+        let pairs = block(0, 50);
+        assert_eq!(Pairs::from_values(&basis, pairs.to_values()), Ok(pairs.clone()));
+        let values = pairs.to_values();
+        for damaged in [values[1..].to_vec(), vec![f64::NAN; 4], vec![0.0; 4 * (OF_BLOCK + 1)]] {
+            assert!(Pairs::from_values(&basis, &damaged).is_err());
+        }
+    }
+}
