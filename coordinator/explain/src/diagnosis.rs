@@ -69,15 +69,15 @@ pub(super) fn diagnose<R>(
         let mut found = search(cache, base, &candidates, &tracks, options)?;
         cache.stage("verdict", "");
         if let Some(noise) = rounds.another_noise(cache, &found) {
-            if is_afforded(cache) {
+            // As many runs again as all searches so far.
+            if cache.affords_runs(cache.runs()) {
                 cache.rows.noise = noise;
                 continue;
             }
             found.cut_short = true;
         }
         let (decision, forces) = decide_further(cache, &mut found, &candidates, &proposed, &tracks, options)?;
-        if decision.verdict == Verdict::Unexplained
-            && is_afforded(cache)
+        if !rounds.stands(&found, &decision)
             && let Some(rows) = rounds.after_nothing(cache, &found)
         {
             cache.rows = rows;
@@ -87,11 +87,6 @@ pub(super) fn diagnose<R>(
         let candidates = proposed.get().unwrap_or(&candidates);
         return then(cache, Diagnosis { found, candidates, decision, tracks: &tracks, forces });
     }
-}
-
-/// Whether the budget holds as many runs again as all searches so far.
-fn is_afforded(cache: &RunCache<'_>) -> bool {
-    cache.affords_runs(cache.runs())
 }
 
 /// How much there is to screen first.

@@ -7,9 +7,10 @@
 use nalgebra::DVector;
 use starlings_estimators::CorrelatedNoise;
 
-use crate::judge::larger_noise::in_larger_noise;
+use crate::judge::larger_noise::{in_larger_noise, leaves_little};
 use crate::judge::noise_model::{alike, best_supported};
 use crate::judge::search_result::SearchResult;
+use crate::judge::verdict::{Decision, Verdict};
 use crate::rows::Rows;
 use crate::run_cache::RunCache;
 
@@ -65,18 +66,29 @@ impl Rounds {
         (!noise.is_empty() && !alike(&noise, &cache.rows.noise)).then_some(noise)
     }
 
-    /// The rows in whose units to search again after a search in which nothing explains the gap: a version that came in later may be the one
+    /// Whether a decision stands: something is told, and if that was in units of a noise larger than was found, it is of a version whose residuals may
+    /// be such a noise.
+    pub(crate) fn stands(&self, found: &SearchResult<'_>, decision: &Decision) -> bool {
+        let told = decision.best.map_or(&found.base, |best| &found.judged[best].fit);
+        let told = if decision.verdict == Verdict::NoGap { &found.base } else { told };
+        let is_believed = self.smaller.as_ref().is_none_or(|of| leaves_little(&of.rows, found, told));
+        decision.verdict != Verdict::Unexplained && is_believed
+    }
+
+    /// The rows in whose units to search again after a search whose decision does not stand: a version that came in later may be the one
     /// whose residuals show what the noise is, or a noise that was found may be larger.
     pub(crate) fn after_nothing(&mut self, cache: &RunCache<'_>, found: &SearchResult<'_>) -> Option<Rows> {
         if let Some(Begin { rows, start }) = self.smaller.take() {
+            // Its runs are known.
             (self.start, self.is_over) = (start, true);
             return Some(rows);
         }
+        // As many runs again as all searches so far.
+        if self.is_over || !cache.affords_runs(cache.runs()) {
+            return None;
+        }
         if let Some(noise) = self.another_noise(cache, found) {
             return Some(Rows { noise, ..cache.rows.clone() });
-        }
-        if self.is_over {
-            return None;
         }
         let rows = in_larger_noise(cache, found)?;
         self.smaller.clone_from(&self.current);

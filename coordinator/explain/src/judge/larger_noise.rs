@@ -6,7 +6,8 @@
 use starlings_estimators::CorrelatedNoise;
 
 use super::adequacy::Adequacy;
-use super::held_out::is_larger;
+use super::contribution::SECOND_SHARE;
+use super::held_out::{FAR, is_larger};
 use super::noise_model::{VersionNoise, most_supported, of_version};
 use super::search_result::SearchResult;
 use crate::fit::fitted_variant::FittedVariant;
@@ -28,13 +29,24 @@ pub(crate) struct LargerNoise {
 /// if it is as large as their residuals; `None` without any.
 pub(crate) fn in_larger_noise(cache: &RunCache<'_>, found: &SearchResult<'_>) -> Option<Rows> {
     let of = |fit: &FittedVariant<'_>| {
-        let rows = in_noise_of(&cache.rows, &fit.predicted)?;
+        let rows =
+            in_noise_of(&cache.rows, &fit.predicted).filter(|_| leaves_little(&cache.rows, found, fit))?;
         let AsLarge { factors, log_density, .. } = AsLarge::new(&cache.rows, &fit.predicted);
         // The size is one more number that is fitted (Schwarz 1978).
         let n_size = factors.iter().filter(|factor| **factor > 1.0).count() as f64;
         Some((log_density - 0.5 * n_size * (cache.rows.train.len().max(1) as f64).ln(), rows))
     };
     most_supported(cache, found, of).map(|(rows, _)| rows)
+}
+
+/// Whether what a version leaves is near the noise that was found in these rows, and less of the gap than a further effect would have to bring:
+/// more is no matter of a noise's memory. The model as it is has brought nothing, and leaves all of it.
+pub(crate) fn leaves_little(rows: &Rows, found: &SearchResult<'_>, fit: &FittedVariant<'_>) -> bool {
+    let rows = Rows { noise: Vec::new(), ..rows.clone() };
+    let square = |fit: &FittedVariant<'_>| Adequacy::of_rows(&rows, &fit.predicted).rmse_over_noise.powi(2);
+    let (was, is) = (square(&found.base), square(fit));
+    let is_most_taken = is - 1.0 <= SECOND_SHARE * (was - 1.0);
+    is <= FAR * FAR && (fit.variant.effects.is_empty() || is_most_taken)
 }
 
 /// The rows in units of a noise as large as what these predictions leave, where that may be all noise.
