@@ -58,7 +58,7 @@ pub(super) fn diagnose<R>(
     foresee(cache, &kinded(study, defs.iter().cloned()), options);
     loop {
         let base = fit_as_it_is(cache, study, rounds.start(), options)?;
-        rounds.begin(&cache.rows, base.z());
+        rounds.begin(base.z());
         cache.stage("locate", "where simulation and data disagree");
         let tracks = cache.tracks(&Point { study, theta: base.theta() })?;
         let (periods, change_points) =

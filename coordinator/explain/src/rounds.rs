@@ -18,7 +18,6 @@ use crate::run_cache::RunCache;
 const MOST: usize = 3;
 
 /// Where a search begins.
-#[derive(Clone)]
 struct Begin {
     rows: Rows,
     /// Where the fit of the model as it is starts; at the prior for `None`.
@@ -29,11 +28,11 @@ struct Begin {
 #[derive(Default)]
 pub(crate) struct Rounds {
     n: usize,
-    /// Where the next fit starts.
+    /// Where the fit of the search under way started.
+    started: Option<DVector<f64>>,
+    /// Where the next one starts.
     start: Option<DVector<f64>>,
-    /// Where the search began that is under way.
-    current: Option<Begin>,
-    /// Where the one began before that, if the one under way is in units of a noise larger than was found.
+    /// Where the search before began, if the one under way is in units of a noise larger than was found.
     smaller: Option<Begin>,
     /// Whether none follows.
     is_over: bool,
@@ -45,10 +44,9 @@ impl Rounds {
         self.start.clone()
     }
 
-    /// A search has begun in units of the noise of these rows, with the model as it is fitted here.
-    pub(crate) fn begin(&mut self, rows: &Rows, fitted: &DVector<f64>) {
-        let start = self.start.replace(fitted.clone());
-        self.current = Some(Begin { rows: rows.clone(), start });
+    /// A search has begun, with the model as it is fitted here.
+    pub(crate) fn begin(&mut self, fitted: &DVector<f64>) {
+        self.started = self.start.replace(fitted.clone());
         self.n += 1;
     }
 
@@ -91,7 +89,7 @@ impl Rounds {
             return Some(Rows { noise, ..cache.rows.clone() });
         }
         let rows = in_larger_noise(cache, found)?;
-        self.smaller.clone_from(&self.current);
+        self.smaller = Some(Begin { rows: cache.rows.clone(), start: self.started.take() });
         Some(rows)
     }
 }

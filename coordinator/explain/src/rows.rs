@@ -143,6 +143,12 @@ impl Rows {
         Self { rows, train, noise: Vec::new() }
     }
 
+    /// Noise sd of a channel of a record, in the channel's unit.
+    pub(crate) fn noise_of(&self, record: usize, channel: usize) -> Option<f64> {
+        let mut of = self.rows[self.of_record(record)].iter().filter(|row| row.channel == channel);
+        of.next().map(|row| row.noise)
+    }
+
     /// Positions of the rows that do not train, increasing.
     pub(crate) fn others(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.rows.len()).filter(|i| self.rows[*i].usage != Usage::Train)

@@ -12,6 +12,7 @@ use starlings_estimators::noise_from_third_differences;
 use starlings_estimators::quantiles::squared_t_as_improbable;
 
 use self::column::{Column, Columns};
+use super::adequacy::AS_STATED;
 use super::effective_noise::{inflation, training_stretches};
 use super::uncertainty::Uncertainty;
 use crate::error::ExplainError;
@@ -80,7 +81,8 @@ pub(crate) fn leftover(
     for result in measured.modulated.iter().filter(is_usable) {
         power = power.max(optimum.unimitated(&result.influence.of_train(cache)?).norm_squared());
     }
-    let power = power / inflation(rows, fit.residual());
+    let (noise, chance) = effective(rows, fit.residual(), fit.variant.n_param());
+    let power = power / (noise * chance);
     let mut left = Leftover { power, ..Leftover::default() };
     let floor = noise_floor(rows, fit.residual());
     let mut residual = optimum.residual().clone();
@@ -102,8 +104,7 @@ pub(crate) fn leftover(
         taken.push(best);
         // The noise is that of the residuals without the columns taken so far.
         let without = residual.rows(0, rows.train.len()).into_owned();
-        let (noise, chance) =
-            effective(inflation(rows, &without), without.len(), fit.variant.n_param() + n_column);
+        let (noise, chance) = effective(rows, &without, fit.variant.n_param() + n_column);
         let corrected: Vec<f64> = whitened.iter().zip(&correction).map(|(e, c)| e - c).collect();
         let gain = (optimum.residual().norm_squared() - residual.norm_squared()) / noise;
         let gain_held_out = (before - beyond(&corrected)) / noise;
@@ -122,14 +123,16 @@ pub(crate) fn leftover(
     Ok(left)
 }
 
-/// The effective noise of n residuals with this inflation, and by what factor a fall of χ² must be larger where they alone tell that noise,
-/// less what was fitted to them.
-fn effective(inflation: f64, n: usize, n_fitted: usize) -> (f64, f64) {
-    if inflation <= 1.0 {
-        return (1.0, 1.0);
+/// The effective noise of training residuals, and by what factor a fall of χ² must be larger where they alone tell it, less what was fitted to them: where
+/// the noise was found, or is larger than stated. Their correlation makes them no fewer here: few enough would refuse no form.
+fn effective(rows: &Rows, residual: &DVector<f64>, n_fitted: usize) -> (f64, f64) {
+    let (n, inflation) = (residual.len() as f64, inflation(rows, residual));
+    let is_known = rows.noise_freedom(|row| row.usage == Usage::Train).is_infinite();
+    if is_known && residual.norm_squared() <= AS_STATED[1] * n {
+        return (inflation, 1.0);
     }
-    let freedom = n as f64 - n_fitted as f64;
-    (inflation * n as f64 / freedom.max(1.0), squared_t_as_improbable(FIRST, freedom) / FIRST)
+    let freedom = n - n_fitted as f64;
+    (inflation * n / freedom.max(1.0), squared_t_as_improbable(FIRST, freedom) / FIRST)
 }
 
 /// χ² of the white part of the residuals, at most that of the stated noise, from their third differences.
@@ -151,4 +154,23 @@ pub(crate) fn white_noise(rows: &Rows, residual: &DVector<f64>) -> f64 {
 /// Share of the residuals' squares that white noise makes, from their third differences.
 pub(crate) fn white_share(rows: &Rows, residual: &DVector<f64>) -> f64 {
     noise_floor(rows, residual) / residual.norm_squared().max(f64::MIN_POSITIVE)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rows::white;
+
+    #[test]
+    fn a_fall_must_be_larger_where_few_residuals_alone_tell_the_noise() {
+        let mut rows = Rows::sample(31, |_| Usage::Train);
+        let residual = white(31, 1);
+        let stated = effective(&rows, &residual, 4);
+        assert_eq!(stated, (inflation(&rows, &residual), 1.0));
+        rows.rows.iter_mut().for_each(|row| row.noise_freedom = 5.9);
+        let (noise, chance) = effective(&rows, &residual, 4);
+        // Student's t with 27 degrees of freedom: 15.45 for 12.
+        assert!((noise / stated.0 - 31.0 / 27.0).abs() < 1e-12 && (FIRST * chance - 15.447).abs() < 1e-3);
+        assert!(effective(&rows, &residual, 31).1.is_infinite(), "as many fitted as there are");
+    }
 }

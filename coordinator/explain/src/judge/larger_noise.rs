@@ -28,6 +28,7 @@ pub(crate) struct LargerNoise {
 /// The rows in units of the noise of the version that is best supported, the model as it is included, of those that leave nothing but noise
 /// if it is as large as their residuals; `None` without any.
 pub(crate) fn in_larger_noise(cache: &RunCache<'_>, found: &SearchResult<'_>) -> Option<Rows> {
+    cache.rows.rows.iter().find(|row| is_found(row))?;
     let of = |fit: &FittedVariant<'_>| {
         let rows =
             in_noise_of(&cache.rows, &fit.predicted).filter(|_| leaves_little(&cache.rows, found, fit))?;

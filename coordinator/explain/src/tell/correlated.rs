@@ -8,7 +8,7 @@ use starlings_study::Study;
 
 use crate::judge::larger_noise::{LargerNoise, larger as larger_noise};
 use crate::number::{percent, three};
-use crate::rows::{Rows, unit};
+use crate::rows::{Row, Rows, unit};
 
 /// Noise that is correlated in time, of the stated size or as large as the residuals, as an Ornstein–Uhlenbeck process is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -33,8 +33,9 @@ pub struct CorrelatedChannel {
 pub(crate) fn correlated_noise(study: &Study, rows: &Rows) -> Vec<CorrelatedChannel> {
     let of = |(output, name): (usize, &String)| {
         let noise = rows.noise.get(output)?.as_ref()?;
-        let row = rows.train.iter().map(|i| &rows.rows[*i]).find(|row| row.output == output);
-        let grown = row.filter(|row| row.noise > study.records[row.record].channels[row.channel].noise);
+        let mut trained = rows.train.iter().map(|i| &rows.rows[*i]).filter(|row| row.output == output);
+        let is_grown = |row: &&Row| row.noise > study.records[row.record].channels[row.channel].noise;
+        let (row, grown) = (trained.clone().next(), trained.find(is_grown));
         Some(CorrelatedChannel {
             channel: name.clone(),
             share: noise.correlated,

@@ -15,6 +15,7 @@ use crate::error::ExplainError;
 use crate::fit::fitted_variant::FittedVariant;
 use crate::locate::Track;
 use crate::number::three;
+use crate::rows::Rows;
 use crate::run_cache::RunCache;
 
 /// Noise of a quantity that was never measured, as a share of its spread.
@@ -45,7 +46,7 @@ pub(crate) fn propose(
 ) -> Result<Option<Experiment>, ExplainError> {
     let study = cache.study;
     let Some(record) = study.records.iter().position(Record::is_trained) else { return Ok(None) };
-    let trials = trials(study, record, tracks);
+    let trials = trials(study, &cache.rows, record, tracks);
     let mut separations = separations(cache, versions, record, &trials)?.into_iter();
     let now = separations.next().flatten().unwrap_or(0.0);
     let mut tried: Vec<(String, f64)> =
@@ -79,10 +80,12 @@ impl Experiment {
 }
 
 /// The record as it was, then the experiments that could be made instead.
-fn trials(study: &Study, record: usize, tracks: &[Track]) -> Vec<Trial> {
+fn trials(study: &Study, rows: &Rows, record: usize, tracks: &[Track]) -> Vec<Trial> {
     let as_it_was = study.whole(record, false);
     let channels = &study.records[record].channels;
-    let measured: Vec<(String, f64)> = channels.iter().map(|c| (c.output.clone(), c.noise)).collect();
+    let measured = channels.iter().enumerate();
+    let measured: Vec<(String, f64)> =
+        measured.map(|(c, of)| (of.output.clone(), rows.noise_of(record, c).unwrap_or(of.noise))).collect();
     let trial = |says: String, window: Window, measured: &[(String, f64)]| Trial {
         says,
         window,

@@ -146,7 +146,7 @@ pub(crate) fn gap(cache: &RunCache<'_>, before: &[f64], after: &[f64]) -> Vec<Ga
                         usage: usage.word().to_owned(),
                         before: cache.rows.rmse(before, of),
                         after: cache.rows.rmse(after, of),
-                        noise: channel.noise,
+                        noise: cache.rows.noise_of(r, c).unwrap_or(channel.noise),
                     });
                 }
             }
@@ -245,7 +245,7 @@ pub(crate) fn curves(cache: &RunCache<'_>, before: &[f64], after: Option<&[f64]>
                 record: record.name.clone(),
                 channel: channel.output.clone(),
                 unit: unit(study, r, c),
-                noise: channel.noise,
+                noise: cache.rows.noise_of(r, c).unwrap_or(channel.noise),
                 held_out: channel.held_out,
                 train: record.train_span(),
                 time: at.iter().map(|i| cache.rows.rows[*i].time).collect(),

@@ -93,8 +93,8 @@ fn far_from_prior(base: &FittedVariant<'_>) -> Option<String> {
     })
 }
 
-/// The noise whose size the residuals alone tell, where the search was made in units of it; else what could be such a noise: of the model as it is where nothing explains the gap, else of what is told or came
-/// nearest.
+/// The noise whose size the residuals alone tell, where the search was made in units of it; else what could be such a noise: of the model as it
+/// is where nothing explains the gap, else of what is told or came nearest.
 fn larger_noise(
     cache: &RunCache<'_>,
     found: &SearchResult<'_>,
