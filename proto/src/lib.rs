@@ -26,7 +26,7 @@ pub use convert::{
 };
 
 /// Number of the protocol; coordinator and worker must have the same.
-pub const PROTOCOL: u32 = 6;
+pub const PROTOCOL: u32 = 7;
 
 /// Largest state that travels inside a job or a prediction, bytes; a larger one travels by itself, under a name.
 pub const MAX_INLINE_STATE: usize = 256 * 1024;

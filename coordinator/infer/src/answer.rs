@@ -34,6 +34,9 @@ pub(crate) fn fit(choice: &InferChoice, structure: &Structure) -> Result<Fit, In
     Ok(Fit { prefactor: choice.prefactor, prior: Prior::independent(&mean, &sd)?, ..fit })
 }
 
+/// How many times as many steps as were sampled are many more.
+const MANY: u64 = 4;
+
 /// A matrix row by row.
 fn rows(matrix: &DMatrix<f64>) -> Vec<Vec<f64>> {
     matrix.row_iter().map(|row| row.iter().copied().collect()).collect()
@@ -74,6 +77,8 @@ pub(crate) struct Answer {
     pub(crate) doubts: Vec<String>,
     /// The estimates of constant noise, where those of the posterior hold for noise of any size.
     constant: Option<Vec<Estimate>>,
+    /// Steps that these intervals were told from, where the recordings have many more.
+    pub(crate) sampled: Option<u64>,
 }
 
 impl Answer {
@@ -96,7 +101,7 @@ impl Answer {
             Ok(extrapolated) => (extrapolated, Vec::new()),
             Err(doubt) => (None, vec![doubt]),
         };
-        Ok(Self { posterior, checks, lag_corrected, extrapolated, doubts, constant: None })
+        Ok(Self { posterior, checks, lag_corrected, extrapolated, doubts, constant: None, sampled: None })
     }
 
     /// The posterior from a smoothed path, where the standard deviation of the measurement is known. The recording as it was measured
@@ -123,12 +128,21 @@ impl Answer {
         let found = smoothed(question, fit, &choice.records, cut, sd, teller)?;
         let doubts = not_converged(found.converged, found.log_likelihood.len()).into_iter().collect();
         let posterior = found.posterior;
-        Ok(Self { posterior, checks, lag_corrected: false, extrapolated: None, doubts, constant: None })
+        Ok(Self {
+            posterior,
+            checks,
+            lag_corrected: false,
+            extrapolated: None,
+            doubts,
+            constant: None,
+            sampled: None,
+        })
     }
 
-    /// Takes a posterior that holds for noise of any size, where there is one.
-    pub(crate) fn take_robust(&mut self, robust: Option<Posterior>) {
+    /// Takes a posterior that holds for noise of any size, where there is one, told from so many of all steps.
+    pub(crate) fn take_robust(&mut self, robust: Option<Posterior>, (sampled, all): (u64, u64)) {
         if let Some(robust) = robust {
+            self.sampled = (sampled < all / MANY).then_some(sampled);
             self.constant = Some(std::mem::replace(&mut self.posterior, robust).estimates);
         }
     }

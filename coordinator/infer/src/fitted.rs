@@ -57,7 +57,7 @@ impl Fitted {
         let freed = Fit { lag_corrected: true, ..fit.clone() };
         if lag_corrected {
             posterior = freed.posterior(sums, structure)?;
-        } else if is_auto && checks.iter().any(|check| check.is_sure() || check.verdict == Verdict::Matters) {
+        } else if is_auto && checks.iter().any(NoiseCheck::is_sure) {
             // A long recording knows its coefficients so well that small errors matter too.
             let without = freed.posterior(sums, structure).ok();
             if let Some(without) = without.filter(|without| is_moved(&posterior, without)) {

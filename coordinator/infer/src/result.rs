@@ -127,8 +127,9 @@ pub struct NoiseVaries {
     pub with: Option<String>,
     /// Where it is smallest and where it is largest: values of that, or shares of all rows that lie before.
     pub at: [f64; 2],
-    /// Standard deviation at the second over that at the first.
-    pub ratio: f64,
+    /// Standard deviation at the second over that at the first; `None` where there is no noise at all at the first.
+    #[serde(default)]
+    pub ratio: Option<f64>,
     /// N R² of the regression that shows it, with two degrees of freedom.
     pub chi_squared: f64,
     /// Probability, at most, of as much in any equation by constant noise.

@@ -40,7 +40,7 @@ pub(crate) fn varies(
     let told: Vec<Varying> = found.unwrap_or_default().into_iter().filter(is_told).collect();
     if !told.is_empty() && !is_noisy && answer.extrapolated.is_none() {
         let robust = fit.robust(&answer.posterior, pairs, (basis, structure), sums.step());
-        answer.take_robust(robust.ok());
+        answer.take_robust(robust.ok(), (2 * pairs.n_pair() as u64, sums.n_step()));
     }
     let inputs = asked.setup.model.equations.iter().flat_map(|equations| &equations.inputs);
     let names: Vec<&String> = structure.equations().iter().chain(inputs.map(|input| &input.name)).collect();
@@ -51,7 +51,7 @@ pub(crate) fn varies(
             With::Course => None,
         },
         at: found.at,
-        ratio: found.ratio,
+        ratio: found.ratio.is_finite().then_some(found.ratio),
         chi_squared: found.chi_squared,
         by_chance: found.by_chance,
     };
@@ -66,9 +66,10 @@ pub(crate) fn said(varies: &[NoiseVaries], choice: &InferChoice, answer: &Answer
     }
     let intervals = match answer.widened() {
         Some([least, most]) => format!(
-            "the intervals of the coefficients allow for it, {} as wide as without, and coefficients of curved functions were freed of what \
-             it moves them by",
-            between(least, most)
+            "the intervals of the coefficients allow for it ({} as wide as without), and coefficients of curved functions were freed of what \
+             it moves them by{}",
+            between(least, most),
+            known_from(answer.sampled)
         ),
         None => "the intervals of the coefficients take it for constant and hold the truth less often than they say, and coefficients \
                  of curved functions are off"
@@ -76,24 +77,34 @@ pub(crate) fn said(varies: &[NoiseVaries], choice: &InferChoice, answer: &Answer
     };
     let missing = if choice.missing.is_some() { ", χ² of missing terms" } else { "" };
     Some(format!(
-        "the noise is not constant: {}; {intervals}; the noise that is told is its mean, and its interval{missing} and a forecast take it \
-         for constant: coefficients are sharper in a state in which it is (log(x) where it grows as x)",
+        "the noise is not constant: {}; {intervals}. The noise that is told is its mean; its interval{missing} and a forecast take it \
+         for constant. Write the model in log(x) if the noise grows as x",
         list.join(", ")
     ))
+}
+
+/// From how many steps that is known, where it is not from most.
+fn known_from(sampled: Option<u64>) -> String {
+    let one =
+        |n| format!(", which is known from {n} steps only: longer recordings do not narrow these intervals");
+    sampled.map(one).unwrap_or_default()
 }
 
 /// Where the noise of an equation is how large.
 fn one(found: &NoiseVaries) -> String {
     let NoiseVaries { equation, at: [from, to], ratio, by_chance, .. } = found;
     let chance = if *by_chance < 1e-9 { "less than 1e-9".to_owned() } else { format!("{by_chance:.0e}") };
-    let at = match &found.with {
-        Some(name) => format!("at {name} = {} as at {name} = {}", rounded(*to, 3), rounded(*from, 3)),
-        None => format!("after {:.0} % of the rows as after {:.0} %", 100.0 * to, 100.0 * from),
+    let (from, to) = match &found.with {
+        Some(name) => {
+            (format!("at {name} = {}", rounded(*from, 3)), format!("at {name} = {}", rounded(*to, 3)))
+        }
+        None => (format!("after {:.0} % of the rows", 100.0 * from), format!("after {:.0} %", 100.0 * to)),
     };
-    format!(
-        "that of {equation} is {} times as large {at} (by chance with probability {chance})",
-        rounded(*ratio, 2)
-    )
+    let what = match ratio {
+        Some(ratio) => format!("that of {equation} is {} times as large {to} as {from}", rounded(*ratio, 2)),
+        None => format!("{equation} has none at all {from}, but {to}"),
+    };
+    format!("{what} (by chance with probability {chance})")
 }
 
 /// Two ratios as words.

@@ -2,8 +2,8 @@
 //!
 //! A pair is three rows that follow one another. Every block gives a few of its own, and merging them in the order of the blocks thins
 //! them where they are too many, so that the sample depends on the blocks alone and not on who picked it. Within a block they lie a
-//! little beside equal distances, or what repeats in a recording could keep step with them. Read next: `varying.rs` and `robust.rs`, which
-//! ask it.
+//! little beside equal distances, in each block otherwise, or what repeats in a recording could keep step with them. Long blocks give no
+//! more pairs than short ones: each pair has the number of steps that it stands for. Read next: `varying.rs` and `robust.rs`, which ask it.
 
 use super::{Basis, InferenceError};
 
@@ -12,13 +12,15 @@ const OF_BLOCK: usize = 512;
 /// Numbers of a block's pairs at most: a hundred and thirty kilobytes.
 const OF_BLOCK_NUMBERS: usize = 1 << 14;
 /// Pairs of a recording at most; between half as many and so many are left of more.
-const OF_ALL: usize = 1 << 14;
+const OF_ALL: usize = 1 << 16;
 /// Numbers of a recording's pairs at most: eight megabytes.
 const OF_ALL_NUMBERS: usize = 1 << 20;
 /// Rows of a pair.
 const ROWS: usize = 3;
 /// Fractional part of the golden ratio, whose multiples are spread evenly over one.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
+/// An odd number whose multiples have bits without an order: the golden ratio again, of 64 bits.
+const SCATTER: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// Pairs of neighbouring steps.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,6 +31,8 @@ pub struct Pairs {
     offered: u64,
     /// The time of the first row and the values of all three, pair after pair.
     values: Vec<f64>,
+    /// Steps that each pair stands for in its block.
+    weights: Vec<f64>,
 }
 
 /// Two steps that follow one another.
@@ -36,6 +40,8 @@ pub struct Pairs {
 pub(crate) struct Pair<'a> {
     /// When the first one starts.
     pub(crate) time: f64,
+    /// Steps that it stands for, up to a factor that all pairs share.
+    pub(crate) weight: f64,
     /// Values of the rows at which the first starts, both meet and the second ends, one after the other.
     rows: &'a [f64],
     n_channel: usize,
@@ -51,23 +57,38 @@ impl<'a> Pair<'a> {
 impl Pairs {
     /// No pairs, of rows of so many values.
     pub fn new(n_channel: usize) -> Self {
-        Self { n_channel, stride: 1, offered: 0, values: Vec::new() }
+        Self { n_channel, stride: 1, offered: 0, values: Vec::new(), weights: Vec::new() }
     }
 
     /// Those of a block in which `n_step` steps start, from its times and its rows one after the other.
     pub fn of_block(times: &[f64], rows: &[f64], n_channel: usize, n_step: usize) -> Self {
         let mut pairs = Self::new(n_channel);
         let n_row = times.len().min(rows.len() / n_channel.max(1));
-        let there = n_step.min(n_row.saturating_sub(1)) / 2;
-        let kept = there.min(OF_BLOCK).min(OF_BLOCK_NUMBERS / (1 + ROWS * n_channel));
+        let n_step = n_step.min(n_row.saturating_sub(1));
+        let (there, kept) = (n_step / 2, Self::n_of_block(n_step, n_channel));
+        // Less than one from the next pair at most, so that no two are the same.
+        let apart = there as f64 / kept as f64;
+        let first = times.first().map_or(0.0, |time| scattered(*time));
         for k in 0..kept {
-            let beside = if kept < there { (k as f64 * GOLDEN).fract() } else { 0.0 };
-            let row = 2 * (((k as f64 + beside) * there as f64 / kept as f64) as usize).min(there - 1);
+            let beside = (k as f64).mul_add(GOLDEN, first).fract() * (apart - 1.0);
+            let row = 2 * ((k as f64).mul_add(apart, beside) as usize).min(there - 1);
             pairs.values.push(times[row]);
             pairs.values.extend_from_slice(&rows[row * n_channel..][..ROWS * n_channel]);
         }
-        pairs.offered = kept as u64;
-        pairs
+        pairs.of_steps(n_step as u64)
+    }
+
+    /// Number of pairs of a block of so many steps.
+    fn n_of_block(n_step: usize, n_channel: usize) -> usize {
+        (n_step / 2).min(OF_BLOCK).min(OF_BLOCK_NUMBERS / (1 + ROWS * n_channel))
+    }
+
+    /// As those of a block of so many steps.
+    fn of_steps(mut self, n_step: u64) -> Self {
+        let n = self.n_pair();
+        self.offered = n as u64;
+        self.weights = vec![n_step as f64 / n as f64; n];
+        self
     }
 
     /// Adds those of the next block.
@@ -78,13 +99,14 @@ impl Pairs {
         if self.n_channel != block.n_channel {
             return Err(InferenceError::Incompatible { what: "their channels" });
         }
-        for pair in block.values.chunks_exact(self.size()) {
+        for (pair, weight) in block.values.chunks_exact(self.size()).zip(&block.weights) {
             if self.offered.is_multiple_of(self.stride) {
                 if self.n_pair() >= self.most() {
                     self.halve();
                 }
                 // There is an even number of them, so that this one is in its turn after halving too.
                 self.values.extend_from_slice(pair);
+                self.weights.push(*weight);
             }
             self.offered += 1;
         }
@@ -100,6 +122,7 @@ impl Pairs {
         let size = self.size();
         let kept = self.values.chunks_exact(size).step_by(2).flatten().copied();
         self.values = kept.collect();
+        self.weights = self.weights.iter().step_by(2).copied().collect();
         self.stride *= 2;
     }
 
@@ -120,8 +143,9 @@ impl Pairs {
     /// The pairs, in the order of the blocks.
     pub(crate) fn iter(&self) -> impl Iterator<Item = Pair<'_>> {
         let n_channel = self.n_channel;
-        self.values.chunks_exact(self.size()).map(move |pair| Pair {
+        self.values.chunks_exact(self.size()).zip(&self.weights).map(move |(pair, weight)| Pair {
             time: pair[0],
+            weight: *weight,
             rows: &pair[1..],
             n_channel,
         })
@@ -132,18 +156,25 @@ impl Pairs {
         &self.values
     }
 
-    /// The pairs of a block from numbers that came from elsewhere.
+    /// The pairs of a block of so many steps from numbers that came from elsewhere.
     ///
     /// # Errors
-    /// `Damaged` where they are no pairs, more than a block has, or not finite.
-    pub fn from_values(basis: &Basis, values: &[f64]) -> Result<Self, InferenceError> {
+    /// `Damaged` where they are not as many as such a block has, or not finite.
+    pub fn from_values(basis: &Basis, n_step: u64, values: &[f64]) -> Result<Self, InferenceError> {
         let pairs = Self { values: values.to_vec(), ..Self::new(basis.n_channel()) };
-        let n = pairs.n_pair();
-        if n > OF_BLOCK || n * pairs.size() != values.len() || values.iter().any(|v| !v.is_finite()) {
+        let n = Self::n_of_block(usize::try_from(n_step).unwrap_or(usize::MAX), basis.n_channel());
+        if n * pairs.size() != values.len() || values.iter().any(|v| !v.is_finite()) {
             return Err(InferenceError::Damaged { what: "the pairs of steps of a block" });
         }
-        Ok(Self { offered: n as u64, ..pairs })
+        Ok(pairs.of_steps(n_step))
     }
+}
+
+/// A number from 0 to 1 that looks like chance and is always the same for the same time.
+fn scattered(time: f64) -> f64 {
+    let bits = time.to_bits().wrapping_mul(SCATTER);
+    let bits = (bits ^ (bits >> 32)).wrapping_mul(SCATTER);
+    (bits >> 11) as f64 / (1_u64 << 53) as f64
 }
 
 #[cfg(test)]
@@ -175,15 +206,40 @@ mod tests {
     }
 
     #[test]
+    fn no_pair_is_taken_twice() {
+        for there in 510..1600 {
+            let starts = starts(&block(there, 2 * there));
+            assert!(starts.windows(2).all(|pair| pair[1] >= pair[0] + 2.0), "{there} pairs");
+            assert!(starts.iter().all(|time| *time <= (3 * there - 2) as f64), "{there} pairs");
+        }
+    }
+
+    #[test]
+    fn what_is_left_of_many_blocks_keeps_no_step_with_them() {
+        let firsts: Vec<f64> = (0..1000).map(|k| starts(&block(k * 20_480, 20_480))[0]).collect();
+        let early = firsts.iter().filter(|time| *time % 20_480.0 < 20.0).count();
+        assert!((440..560).contains(&early), "{early}");
+    }
+
+    #[test]
+    fn a_pair_stands_for_the_steps_of_its_block() {
+        let mut all = block(0, 100);
+        all.merge(&block(1000, 102_400)).unwrap_or_else(|error| panic!("{error}"));
+        let weights: Vec<f64> = all.iter().map(|pair| pair.weight).collect();
+        assert_eq!((weights[0], weights[weights.len() - 1]), (2.0, 200.0));
+        assert!((weights.iter().sum::<f64>() - 102_500.0).abs() < 1e-6);
+    }
+
+    #[test]
     fn merged_blocks_are_thinned_evenly_and_never_more_than_a_sample() {
         let mut all = Pairs::new(1);
-        for k in 0..100 {
+        for k in 0..400 {
             all.merge(&block(k * 2000, 2000)).unwrap_or_else(|error| panic!("{error}"));
             assert!(all.n_pair() <= OF_ALL);
         }
         assert!(all.n_pair() > OF_ALL / 2 - OF_BLOCK, "{}", all.n_pair());
         let starts = starts(&all);
-        let halves = starts.iter().filter(|time| **time < 100_000.0).count() as f64 / starts.len() as f64;
+        let halves = starts.iter().filter(|time| **time < 400_000.0).count() as f64 / starts.len() as f64;
         assert!((halves - 0.5).abs() < 0.001, "{halves}");
         assert!(all.merge(&Pairs::new(2)).is_err(), "rows of another length");
     }
@@ -192,10 +248,11 @@ mod tests {
     fn numbers_that_are_no_pairs_are_refused() {
         let basis = Basis::new(1, 0);
         let pairs = block(0, 50);
-        assert_eq!(Pairs::from_values(&basis, pairs.to_values()), Ok(pairs.clone()));
+        assert_eq!(Pairs::from_values(&basis, 50, pairs.to_values()), Ok(pairs.clone()));
         let values = pairs.to_values();
-        for damaged in [values[1..].to_vec(), vec![f64::NAN; 4], vec![0.0; 4 * (OF_BLOCK + 1)]] {
-            assert!(Pairs::from_values(&basis, &damaged).is_err());
+        for damaged in [values[1..].to_vec(), values[4..].to_vec(), vec![f64::NAN; 100], vec![0.0; 104]] {
+            assert!(Pairs::from_values(&basis, 50, &damaged).is_err());
         }
+        assert!(Pairs::from_values(&basis, u64::MAX, values).is_err());
     }
 }

@@ -82,11 +82,11 @@ pub fn lag_spread(
     for pair in pairs.iter() {
         let first = residuals.of(&pair, 0).to_vec();
         for ([squares, products], (a, b)) in sums.iter_mut().zip(first.iter().zip(residuals.of(&pair, 1))) {
-            *squares += 0.5 * (a * a + b * b);
-            *products += (a * b).powi(2);
+            *squares += pair.weight * 0.5 * (a * a + b * b);
+            *products += pair.weight * (a * b).powi(2);
         }
     }
-    let n = pairs.n_pair() as f64;
+    let n: f64 = pairs.iter().map(|pair| pair.weight).sum();
     let spread = |[squares, products]: &[f64; 2]| (n * products).sqrt() / squares;
     Ok(sums.iter().map(|sums| spread(sums).max(1.0)).collect())
 }

@@ -19,6 +19,8 @@ const HARMLESS: f64 = 1.1;
 const MIDDLE: f64 = 0.9;
 /// Half the ranks that are taken together where the noise is told: a tenth of the pairs.
 const TOGETHER: f64 = 0.1;
+/// Pairs that share the smallest or the largest value from which the noise is told there by them alone.
+const TIED: usize = 16;
 
 /// What the noise varies with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,7 +40,7 @@ pub struct Varying {
     pub with: With,
     /// Where it is smallest and where it is largest: values of the channel, or shares from 0 to 1 of the recordings that lie before.
     pub at: [f64; 2],
-    /// Standard deviation there over that at the first.
+    /// Standard deviation there over that at the first, infinite where there is no noise at all at the first.
     pub ratio: f64,
     /// N R².
     pub chi_squared: f64,
@@ -66,8 +68,7 @@ pub fn varying(
         let values: Vec<f64> = pairs.iter().map(|pair| pair.row(0)[c]).collect();
         (With::Channel(c), Ranks::new(values))
     };
-    let n = pairs.n_pair() as f64;
-    let course = Ranks::new((0..pairs.n_pair()).map(|k| (k as f64 + 0.5) / n).collect());
+    let course = Ranks::new(before(pairs));
     let all = (0..basis.n_channel()).map(channel).chain([(With::Course, course)]);
     let all: Vec<(With, Ranks)> = all.filter(|(_, ranks)| ranks.vary()).collect();
     let n_test = (all.len() * basis.n_state()) as f64;
@@ -75,8 +76,9 @@ pub fn varying(
         let tests = all.iter().map(|(with, ranks)| (*with, ranks, ranks.curve(sizes)));
         let (with, ranks, curve) = tests.max_by(|a, b| a.2.chi_squared.total_cmp(&b.2.chi_squared))?;
         let by_chance = (n_test * (-0.5 * curve.chi_squared).exp()).min(1.0);
-        let told = by_chance < false_alarm && curve.ratio() > HARMLESS;
         let [(from, small), (to, large)] = curve.ends().map(|at| ranks.near(at, sizes));
+        let differ = large > small && (from < to || to < from);
+        let told = by_chance < false_alarm && curve.ratio() > HARMLESS && differ;
         let (at, ratio) = ([from, to], large / small);
         told.then_some(Varying { equation, with, at, ratio, chi_squared: curve.chi_squared, by_chance })
     };
@@ -100,6 +102,17 @@ fn sizes(
         }
     }
     Ok(sizes)
+}
+
+/// The share of all steps that lie before the middle of each pair's.
+fn before(pairs: &Pairs) -> Vec<f64> {
+    let all: f64 = pairs.iter().map(|pair| pair.weight).sum();
+    let mut before = 0.0;
+    let one = |weight: f64| {
+        before += weight;
+        (before - 0.5 * weight) / all
+    };
+    pairs.iter().map(|pair| pair.weight).map(one).collect()
 }
 
 /// Values with their ranks from −1 to 1, the same for equal ones.
@@ -143,6 +156,14 @@ impl Ranks {
         ends.is_some_and(|(first, last)| self.values[*first] < self.values[*last])
     }
 
+    /// Numbers of pairs that share the smallest and the largest value.
+    fn tied(&self) -> [usize; 2] {
+        let same = |a: usize| move |b: &&usize| self.values[a].total_cmp(&self.values[**b]).is_eq();
+        let low = self.order.first().map(|k| self.order.iter().take_while(same(*k)).count());
+        let high = self.order.last().map(|k| self.order.iter().rev().take_while(same(*k)).count());
+        [low, high].map(|n| n.unwrap_or(0))
+    }
+
     /// The curve of sizes, by least squares.
     fn curve(&self, sizes: &[f64]) -> Curve {
         let n = sizes.len() as f64;
@@ -174,11 +195,19 @@ impl Ranks {
         Curve { of: [means[2] - b * means[0] - c * means[1], b, c], middle, chi_squared }
     }
 
-    /// Middle value and mean size of the pairs about a rank.
+    /// Middle value and mean size of the pairs about a rank; at an end whose value many share, of these.
     fn near(&self, rank: f64, sizes: &[f64]) -> (f64, f64) {
         let n = self.order.len();
         let at = |rank: f64| ((0.5 * (1.0 + rank) * n as f64).max(0.0) as usize).min(n);
-        let near = &self.order[at(rank - TOGETHER)..at(rank + TOGETHER)];
+        let [low, high] = self.tied();
+        let near = if rank >= MIDDLE && high >= TIED {
+            n - high..n
+        } else if rank <= -MIDDLE && low >= TIED {
+            0..low
+        } else {
+            at(rank - TOGETHER)..at(rank + TOGETHER)
+        };
+        let near = &self.order[near];
         let mean = near.iter().map(|k| sizes[*k]).sum::<f64>() / near.len() as f64;
         (self.values[near[near.len() / 2]], mean)
     }

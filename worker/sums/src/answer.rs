@@ -92,10 +92,10 @@ pub fn answer_of(
         return Err(InferenceError::Shape { what: "numbers of block sums", expected, got });
     }
     let (values, pairs) = values.split_at(expected);
-    let pairs = Pairs::from_values(&question.basis, pairs)?;
     let (sums, span) = values.split_at(expected - 2);
     let level = |(k, values)| Sums::from_values(&question.basis, step * f64::from(1_u32 << k), values);
-    let levels = sums.chunks_exact(n).enumerate().map(level).collect::<Result<_, _>>()?;
+    let levels = sums.chunks_exact(n).enumerate().map(level).collect::<Result<Vec<_>, _>>()?;
+    let pairs = Pairs::from_values(&question.basis, levels.first().map_or(0, Sums::n_step), pairs)?;
     let span = [span[0], span[1]];
     if !(span[0] <= span[1] && span.iter().all(|end| end.is_finite())) {
         return Err(InferenceError::Damaged { what: "the times of a block" });

@@ -92,17 +92,17 @@ fn sums_of_a_block_are_those_of_a_stream_bit_by_bit() {
 fn numbers_that_are_no_sums_are_refused() {
     let setup = setup(1);
     let question = Question::of(&setup).unwrap();
-    let values = [summed(&setup, 0, 300, 0, 300)[0].to_values(), vec![0.0, 30.0]].concat();
+    let sums = [summed(&setup, 0, 300, 0, 300)[0].to_values(), vec![0.0, 30.0]].concat();
+    // A hundred and fifty pairs, each of a time and three rows of two values.
+    let with = |pairs: Vec<f64>| [sums.clone(), pairs].concat();
+    let values = with(vec![0.5; 1050]);
+    assert!(answer_of(&question, STEP, 1, &values).is_ok());
     let refused = |values: &[f64]| answer_of(&question, STEP, 1, values).unwrap_err();
-    assert!(matches!(refused(&values[1..]), InferenceError::Shape { .. }));
-    for pairs in [vec![0.5; 6], vec![f64::NAN; 7]] {
-        let more = [values.clone(), pairs].concat();
-        assert!(
-            matches!(refused(&more), InferenceError::Damaged { .. }),
-            "no time and three rows of two values"
-        );
+    assert!(matches!(refused(&sums[1..]), InferenceError::Shape { .. }));
+    for pairs in [vec![], vec![0.5; 1043], vec![0.5; 1049], vec![0.5; 1057], vec![f64::NAN; 1050]] {
+        assert!(matches!(refused(&with(pairs)), InferenceError::Damaged { .. }));
     }
-    let ends = values.len() - 1;
+    let ends = sums.len() - 1;
     for fault in [[-1.0, 9.0, 0.0, 0.0, 0.0], [-1.0, 1.0, -3.0, 0.0, 0.0], [-1.0, 1.0, 3.0, 0.5, 0.0]] {
         assert!(matches!(refused(&fault), InferenceError::Damaged { .. }), "{fault:?}");
     }
