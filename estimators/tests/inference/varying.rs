@@ -124,7 +124,7 @@ fn where_there_is_no_noise_or_an_input_is_rarely_on_both_ends_are_told() {
     assert!((2.2..3.5).contains(&rare.ratio), "{rare:?}");
     // A machine that is switched off.
     let on = path(5, 5000, |_, x| -x, |_, _| 0.5);
-    let rows: Vec<[f64; 1]> = on.into_iter().chain([[0.0]; 5000]).collect();
+    let rows: Vec<[f64; 1]> = on.into_iter().chain(vec![[0.0]; 5000]).collect();
     let (basis, structure) = line();
     let off = asked(&basis, &structure, &rows, H).told;
     assert!(off[0].ratio.is_infinite(), "{off:?}");
