@@ -17,6 +17,28 @@ fn said<'a>(found: &'a Value, words: &str) -> Vec<&'a str> {
     all.filter(|warning| warning.contains(words)).collect()
 }
 
+/// A study of one state by its rate, whose parameters are asked for.
+fn one_state(rate: &str, parameters: &str) -> String {
+    format!(
+        r#"
+[study]
+name = "path"
+[model]
+kind = "equations"
+outputs = [ {{ name = "x", value = "x" }} ]
+[[model.states]]
+name = "x"
+rate = "{rate}"
+[infer]
+parameters = {parameters}
+[[records]]
+name = "path"
+file = "data.csv"
+channels = [ {{ column = "x", output = "x" }} ]
+"#
+    )
+}
+
 /// Mean and standard deviation of the coefficient of this name.
 fn value(found: &Value, name: &str) -> [f64; 2] {
     let all = found["coefficients"].as_array().unwrap();
@@ -79,22 +101,7 @@ fn a_prior_that_the_data_contradict_is_told() {
 #[test]
 fn what_noise_makes_of_a_coarse_step_is_told_of_a_long_recording_too() {
     // A decay of rate 5 in steps of a quarter of its time, as it moves from row to row without any error.
-    let study = r#"
-[study]
-name = "decay"
-[model]
-kind = "equations"
-outputs = [ { name = "x", value = "x" } ]
-[[model.states]]
-name = "x"
-rate = "-a*x"
-[infer]
-parameters = ["a"]
-[[records]]
-name = "path"
-file = "data.csv"
-channels = [ { column = "x", output = "x" } ]
-"#;
+    let study = one_state("-a*x", r#"["a"]"#);
     let path = |step: f64, n: usize| {
         let (mut noise, keeps) = (noise(7), (-5.0 * step).exp());
         let (mut x, mut text) = (0.0, "time,x\n".to_owned());
@@ -102,7 +109,7 @@ channels = [ { column = "x", output = "x" } ]
             writeln!(text, "{:?},{x:?}", (k as f64 * step * 1e6).round() / 1e6).unwrap();
             x = keeps * x + (0.1 * (1.0 - keeps * keeps)).sqrt() * noise();
         }
-        infer(folder(study, &text).path(), "out", "2")
+        infer(folder(&study, &text).path(), "out", "2")
     };
     let found = path(0.05, 30_000);
     assert!(value(&found, "a")[0] > 5.5, "{found}");
@@ -141,26 +148,11 @@ fn bistable(size: impl Fn(f64) -> f64) -> String {
 
 #[test]
 fn noise_that_depends_on_the_state_is_told_with_intervals_that_hold_and_constant_noise_is_not() {
-    let study = r#"
-[study]
-name = "bistable"
-[model]
-kind = "equations"
-outputs = [ { name = "x", value = "x" } ]
-[[model.states]]
-name = "x"
-rate = "a*x - b*x^3"
-[infer]
-parameters = ["a", "b"]
-[[records]]
-name = "path"
-file = "data.csv"
-channels = [ { column = "x", output = "x" } ]
-"#;
-    let steady = infer(folder(study, &bistable(|_| 0.6)).path(), "out", "2");
+    let study = one_state("a*x - b*x^3", r#"["a", "b"]"#);
+    let steady = infer(folder(&study, &bistable(|_| 0.6)).path(), "out", "2");
     assert_eq!(said(&steady, "not constant"), Vec::<&str>::new());
     assert_eq!((&steady["noise_varies"], &steady["robust"]), (&Value::Null, &Value::Null));
-    let dir = folder(study, &bistable(|x| 0.2 + 0.6 * x.abs()));
+    let dir = folder(&study, &bistable(|x| 0.2 + 0.6 * x.abs()));
     let found = infer(dir.path(), "out", "2");
     let told = said(&found, "the noise is not constant: that of x is ");
     assert_eq!(told.len(), 1, "{found}");

@@ -3,8 +3,9 @@
 //! Files, each of which sees only those before it: [`effective_noise`], [`null_distribution`] (what a search finds by chance),
 //! [`misfit`], [`adequacy`] (residuals against the stated noise), [`uncertainty`] (what the uncertainty of an estimate explains),
 //! [`held_out`], [`form`] (whether an effect has the right form), [`gates`], [`search_result`] (all that was judged),
-//! [`noise_model`] (whether the noise is correlated), [`larger_noise`] (and larger than was found), [`contribution`] (whether every effect takes away its share), [`objections`]
-//! (what speaks against a name), [`rivals`] (what comes as close), [`verdict`], [`probability`] (how probable each answer is).
+//! [`noise_model`] (whether the noise is correlated), [`contribution`] (whether every effect takes away its share), [`larger_noise`]
+//! (whether a noise that was found is larger), [`objections`] (what speaks against a name), [`rivals`] (what comes as close), [`verdict`],
+//! [`probability`] (how probable each answer is).
 
 pub(crate) mod adequacy;
 pub(crate) mod contribution;

@@ -75,10 +75,15 @@ pub(crate) struct Answer {
     pub(crate) extrapolated: Option<Extrapolated>,
     /// What went less well than was asked for.
     pub(crate) doubts: Vec<String>,
-    /// The estimates of constant noise, where those of the posterior hold for noise of any size.
-    constant: Option<Vec<Estimate>>,
-    /// Steps that these intervals were told from, where the recordings have many more.
-    pub(crate) sampled: Option<u64>,
+    /// What the posterior was before, where its intervals hold for noise of any size.
+    constant: Option<Constant>,
+}
+
+/// What noise of one size gives.
+struct Constant {
+    estimates: Vec<Estimate>,
+    /// Steps that the intervals of any noise were told from, where the recordings have many more.
+    sampled: Option<u64>,
 }
 
 impl Answer {
@@ -101,7 +106,7 @@ impl Answer {
             Ok(extrapolated) => (extrapolated, Vec::new()),
             Err(doubt) => (None, vec![doubt]),
         };
-        Ok(Self { posterior, checks, lag_corrected, extrapolated, doubts, constant: None, sampled: None })
+        Ok(Self { posterior, checks, lag_corrected, extrapolated, doubts, constant: None })
     }
 
     /// The posterior from a smoothed path, where the standard deviation of the measurement is known. The recording as it was measured
@@ -128,35 +133,30 @@ impl Answer {
         let found = smoothed(question, fit, &choice.records, cut, sd, teller)?;
         let doubts = not_converged(found.converged, found.log_likelihood.len()).into_iter().collect();
         let posterior = found.posterior;
-        Ok(Self {
-            posterior,
-            checks,
-            lag_corrected: false,
-            extrapolated: None,
-            doubts,
-            constant: None,
-            sampled: None,
-        })
+        Ok(Self { posterior, checks, lag_corrected: false, extrapolated: None, doubts, constant: None })
     }
 
-    /// Takes a posterior that holds for noise of any size, where there is one, told from so many of all steps.
-    pub(crate) fn take_robust(&mut self, robust: Option<Posterior>, (sampled, all): (u64, u64)) {
-        if let Some(robust) = robust {
-            self.sampled = (sampled < all / MANY).then_some(sampled);
-            self.constant = Some(std::mem::replace(&mut self.posterior, robust).estimates);
-        }
+    /// Takes a posterior that holds for noise of any size, told from so many of all steps.
+    pub(crate) fn take_robust(&mut self, robust: Posterior, (sampled, all): (u64, u64)) {
+        let estimates = std::mem::replace(&mut self.posterior, robust).estimates;
+        self.constant = Some(Constant { estimates, sampled: (sampled < all / MANY).then_some(sampled) });
+    }
+
+    /// Steps that intervals of any noise were told from, where the recordings have many more.
+    pub(crate) fn sampled(&self) -> Option<u64> {
+        self.constant.as_ref()?.sampled
     }
 
     /// How many times as wide as of constant noise the interval of a coefficient is; 1 where it is that.
     pub(crate) fn widening(&self, name: &str) -> f64 {
         let sd = |estimates: &[Estimate]| estimates.iter().find(|e| e.name == name)?.value.map(|v| v.sd);
-        let constant = self.constant.as_deref().and_then(sd);
+        let constant = self.constant.as_ref().and_then(|constant| sd(&constant.estimates));
         constant.zip(sd(&self.posterior.estimates)).map_or(1.0, |(constant, sd)| sd / constant)
     }
 
     /// The least and the most of that over the coefficients; `None` where the intervals are those of constant noise.
     pub(crate) fn widened(&self) -> Option<[f64; 2]> {
-        let estimates = self.constant.as_deref()?.iter().filter(|estimate| estimate.value.is_some());
+        let estimates = self.constant.as_ref()?.estimates.iter().filter(|estimate| estimate.value.is_some());
         let all: Vec<f64> = estimates.map(|estimate| self.widening(&estimate.name)).collect();
         let most = all.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         Some([all.iter().copied().fold(f64::INFINITY, f64::min), most])

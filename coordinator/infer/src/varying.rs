@@ -38,9 +38,12 @@ pub(crate) fn varies(
     let found = varying(pairs, basis, answer.posterior.drift(), sums.step(), FALSE_ALARM);
     let is_told = |found: &Varying| found.ratio > HIDDEN || !(is_coarse || is_noisy);
     let told: Vec<Varying> = found.unwrap_or_default().into_iter().filter(is_told).collect();
-    if !told.is_empty() && !is_noisy && answer.extrapolated.is_none() {
-        let robust = fit.robust(&answer.posterior, pairs, (basis, structure), sums.step());
-        answer.take_robust(robust.ok(), (2 * pairs.n_pair() as u64, sums.n_step()));
+    if !told.is_empty()
+        && !is_noisy
+        && answer.extrapolated.is_none()
+        && let Ok(robust) = fit.robust(&answer.posterior, pairs, (basis, structure), sums.step())
+    {
+        answer.take_robust(robust, (2 * pairs.n_pair() as u64, sums.n_step()));
     }
     let inputs = asked.setup.model.equations.iter().flat_map(|equations| &equations.inputs);
     let names: Vec<&String> = structure.equations().iter().chain(inputs.map(|input| &input.name)).collect();
@@ -69,7 +72,7 @@ pub(crate) fn said(varies: &[NoiseVaries], choice: &InferChoice, answer: &Answer
             "the intervals of the coefficients allow for it ({} as wide as without), and coefficients of curved functions were freed of what \
              it moves them by{}",
             between(least, most),
-            known_from(answer.sampled)
+            known_from(answer.sampled())
         ),
         None => "the intervals of the coefficients take it for constant and hold the truth less often than they say, and coefficients \
                  of curved functions are off"
@@ -111,4 +114,31 @@ fn one(found: &NoiseVaries) -> String {
 fn between(least: f64, most: f64) -> String {
     let [least, most] = [rounded(least, 2), rounded(most, 2)];
     if most > least { format!("{least} to {most} times") } else { format!("{most} times") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stretch_without_any_noise_is_told_so_and_read_again() {
+        let varies = |ratio| NoiseVaries {
+            equation: "x".to_owned(),
+            with: None,
+            at: [0.05, 0.95],
+            ratio,
+            chi_squared: 900.0,
+            by_chance: 0.0,
+        };
+        let none = varies(None);
+        assert!(one(&none).starts_with("x has none at all after 5 % of the rows, but after 95 % (by chance"));
+        let ratio = one(&varies(Some(2.5)));
+        assert!(
+            ratio.starts_with("that of x is 2.5 times as large after 95 % as after 5 % of the rows"),
+            "{ratio}"
+        );
+        let read: NoiseVaries = serde_json::from_str(&serde_json::to_string(&none).unwrap_or_default())
+            .unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(read, none);
+    }
 }

@@ -1,6 +1,6 @@
 //! Growth of biomass on a substrate, and its product, after Monod (1949): a model without death of cells, and recordings in
 //! which cells die.
-#![allow(missing_docs, unreachable_pub, clippy::unwrap_used)]
+#![allow(dead_code, missing_docs, unreachable_pub, clippy::unwrap_used)]
 
 use starlings_coordinator::study::twin::{Twin, simulate};
 
@@ -98,11 +98,18 @@ pub fn reactor(noise: [f64; 3], train: f64, held_out: &str, death: bool) -> Stri
     if death { study + DEATH } else { study }
 }
 
-/// The reactor's recording with cells dying at this rate.
+/// The reactor's recording with cells dying at this rate, and white noise of these sd.
 pub fn recorded(noise: [f64; 3], span: f64, kd: f64) -> String {
+    measured(span, kd, |k, clean| {
+        clean.iter().zip(normals(clean.len(), 10 + k as u64)).map(|(y, e)| y + noise[k] * e).collect()
+    })
+}
+
+/// The same with what the instruments of biomass (0), substrate and product show of the values.
+pub fn measured(span: f64, kd: f64, shown: impl Fn(usize, &[f64]) -> Vec<f64>) -> String {
     let times = grid(120, span / 119.0);
     let flat = vec![1.0; times.len()];
-    let text = reactor(noise, span, "product", true);
+    let text = reactor(NOISE, span, "product", true);
     let blank = csv("time,biomass,substrate,product", &[&times, &flat, &flat, &flat]);
     let values = [("mu", 0.4), ("Ks", 0.5), ("a", 0.3), ("b", 0.02), ("Y", 0.5)];
     let twin = Twin {
@@ -112,10 +119,7 @@ pub fn recorded(noise: [f64; 3], span: f64, kd: f64) -> String {
         ..Twin::default()
     };
     let made = simulate(&Case::new(&text, &[("batch.csv", blank)]).study(), &twin).unwrap();
-    let noisy = |k: usize| -> Vec<f64> {
-        let clean = &made.values
-            [made.columns.iter().position(|c| c == ["biomass", "substrate", "product"][k]).unwrap()];
-        clean.iter().zip(normals(times.len(), 10 + k as u64)).map(|(y, e)| y + noise[k] * e).collect()
-    };
-    csv("time,biomass,substrate,product", &[&times, &noisy(0), &noisy(1), &noisy(2)])
+    let column = |name: &str| &made.values[made.columns.iter().position(|c| c == name).unwrap()];
+    let [x, s, p] = ["biomass", "substrate", "product"].map(column);
+    csv("time,biomass,substrate,product", &[&times, &shown(0, x), &shown(1, s), &shown(2, p)])
 }

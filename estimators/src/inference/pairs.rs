@@ -1,9 +1,12 @@
 //! Neighbouring steps of a recording, picked evenly over its length: a sample of constant size for what sums cannot say.
 //!
 //! A pair is three rows that follow one another. Every block gives a few of its own, and merging them in the order of the blocks thins
-//! them where they are too many, so that the sample depends on the blocks alone and not on who picked it. Within a block they lie a
-//! little beside equal distances, in each block otherwise, or what repeats in a recording could keep step with them. Long blocks give no
+//! them where they are too many, so that the sample depends on the blocks alone and not on who picked it. Within a block they lie at random
+//! about equal distances, by the time of its first row, or what repeats in a recording could keep step with them. Long blocks give no
 //! more pairs than short ones: each pair has the number of steps that it stands for. Read next: `varying.rs` and `robust.rs`, which ask it.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 
 use super::{Basis, InferenceError};
 
@@ -17,11 +20,6 @@ const OF_ALL: usize = 1 << 16;
 const OF_ALL_NUMBERS: usize = 1 << 20;
 /// Rows of a pair.
 const ROWS: usize = 3;
-/// Fractional part of the golden ratio, whose multiples are spread evenly over one.
-const GOLDEN: f64 = 0.618_033_988_749_894_9;
-/// An odd number whose multiples have bits without an order: the golden ratio again, of 64 bits.
-const SCATTER: u64 = 0x9e37_79b9_7f4a_7c15;
-
 /// Pairs of neighbouring steps.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pairs {
@@ -66,11 +64,11 @@ impl Pairs {
         let n_row = times.len().min(rows.len() / n_channel.max(1));
         let n_step = n_step.min(n_row.saturating_sub(1));
         let (there, kept) = (n_step / 2, Self::n_of_block(n_step, n_channel));
-        // Less than one from the next pair at most, so that no two are the same.
         let apart = there as f64 / kept as f64;
-        let first = times.first().map_or(0.0, |time| scattered(*time));
+        let mut random = ChaCha8Rng::seed_from_u64(times.first().map_or(0, |time| time.to_bits()));
         for k in 0..kept {
-            let beside = (k as f64).mul_add(GOLDEN, first).fract() * (apart - 1.0);
+            // A step short of the next pair at most, so that no two are the same.
+            let beside = random.random::<f64>() * (apart - 1.0);
             let row = 2 * ((k as f64).mul_add(apart, beside) as usize).min(there - 1);
             pairs.values.push(times[row]);
             pairs.values.extend_from_slice(&rows[row * n_channel..][..ROWS * n_channel]);
@@ -168,13 +166,6 @@ impl Pairs {
         }
         Ok(pairs.of_steps(n_step))
     }
-}
-
-/// A number from 0 to 1 that looks like chance and is always the same for the same time.
-fn scattered(time: f64) -> f64 {
-    let bits = time.to_bits().wrapping_mul(SCATTER);
-    let bits = (bits ^ (bits >> 32)).wrapping_mul(SCATTER);
-    (bits >> 11) as f64 / (1_u64 << 53) as f64
 }
 
 #[cfg(test)]

@@ -1,12 +1,13 @@
 //! Coefficients and their intervals under noise whose size varies: by what the residuals of each step say, not by their mean.
 //!
 //! With s = h Fᵀ D⁻¹ r, the score of a step, and Ξ the precision, the estimate has the covariance Ξ⁻¹ (Σ s sᵀ) Ξ⁻¹ whatever the noise of
-//! each step is, as long as that of different ones is independent (Eicker 1963; Huber 1967; White 1980). At the mid-point a score has
-//! the mean ½ h Σ_lk W_lk ∂F_lp/∂x_k, W = h D⁻¹ r rᵀ, where the fit takes off the mean of W, the unit matrix: what W and the slopes vary by
-//! together moves the coefficients of curved functions, and is taken off here. The drift is then that of Itô's equation. Both sums are those of
-//! a sample of the steps, each as often as it stands for others; what a sample does not know of the second widens the interval, which
-//! therefore stops to shrink where the recording is much longer than the sample; each residual is divided by what its own step leaves of it (MacKinnon & White 1985, HC3). The estimate is not
-//! the most accurate one. Read next: `varying.rs`, which says when this is needed.
+//! each step is, as long as that of different ones is independent: the sandwich of Eicker (1963), Huber (1967) and White (1980). At the
+//! mid-point a score has the mean ½ h Σ_lk W_lk ∂F_lp/∂x_k, W = h D⁻¹ r rᵀ, where the fit takes off the mean of W, the unit matrix: what W
+//! and the slopes vary by together, the drift that noise induces, moves the coefficients of curved functions and is taken off here. The
+//! drift is then that of Itô's equation. Both sums are those of a sample of the steps, each as often as it stands for others. What a sample
+//! does not know of the second widens the interval, which therefore stops shrinking where the recording is much longer than the sample.
+//! Each residual is divided by what its own step leaves of it (MacKinnon & White 1985, HC3). The estimate is not the most accurate one.
+//! Read next: `varying.rs`, which says when this is needed.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -27,7 +28,7 @@ struct Sample<'a> {
     step: f64,
     /// D⁻¹.
     inverse: DMatrix<f64>,
-    /// Every how manieth pair is taken.
+    /// One pair in so many is taken.
     every: usize,
     /// Coefficients that enter each equation, by their place among those that have a value, with factor and function.
     entering: Vec<Vec<(usize, f64, usize)>>,
@@ -71,7 +72,7 @@ impl Fit {
     }
 }
 
-/// Every how manieth of so many pairs is taken for so many coefficients.
+/// One of so many pairs in how many is taken for so many coefficients.
 fn every(n_pair: usize, n_active: usize) -> usize {
     (2 * n_pair).saturating_mul(n_active.pow(2)).div_ceil(MOST_PRODUCTS).max(1)
 }

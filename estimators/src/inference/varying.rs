@@ -1,4 +1,4 @@
-//! Whether the noise has one size throughout: the sizes of residuals regressed on each state, each input and the time.
+//! Whether the noise has one size throughout, or is heteroscedastic: the sizes of residuals regressed on each state, each input and the time.
 //!
 //! A size is that of the difference of two neighbouring residuals, |r_n − r_{n+1}|: what the drift lacks, a change of its coefficients and
 //! the step's own error are nearly the same in both and fall out (Rice 1984), and it is symmetric about zero, which the absolute value

@@ -123,8 +123,9 @@ pub(crate) fn leftover(
     Ok(left)
 }
 
-/// The effective noise of training residuals, and by what factor a fall of χ² must be larger where they alone tell it, less what was fitted to them: where
-/// the noise was found, or is larger than stated. Their correlation makes them no fewer here: few enough would refuse no form.
+/// The effective noise of training residuals, and by what factor a fall of χ² must be larger where they alone tell it, less what was
+/// fitted to them: where the noise was found, or is larger than stated. Their correlation makes them no fewer here: few enough would refuse
+/// no form.
 fn effective(rows: &Rows, residual: &DVector<f64>, n_fitted: usize) -> (f64, f64) {
     let (n, inflation) = (residual.len() as f64, inflation(rows, residual));
     let is_known = rows.noise_freedom(|row| row.usage == Usage::Train).is_infinite();

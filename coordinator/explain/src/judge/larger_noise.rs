@@ -30,12 +30,8 @@ pub(crate) struct LargerNoise {
 pub(crate) fn in_larger_noise(cache: &RunCache<'_>, found: &SearchResult<'_>) -> Option<Rows> {
     cache.rows.rows.iter().find(|row| is_found(row))?;
     let of = |fit: &FittedVariant<'_>| {
-        let rows =
-            in_noise_of(&cache.rows, &fit.predicted).filter(|_| leaves_little(&cache.rows, found, fit))?;
-        let AsLarge { factors, log_density, .. } = AsLarge::new(&cache.rows, &fit.predicted);
-        // The size is one more number that is fitted (Schwarz 1978).
-        let n_size = factors.iter().filter(|factor| **factor > 1.0).count() as f64;
-        Some((log_density - 0.5 * n_size * (cache.rows.train.len().max(1) as f64).ln(), rows))
+        let in_noise = in_noise_of(&cache.rows, &fit.predicted);
+        in_noise.filter(|_| leaves_little(&cache.rows, found, fit))
     };
     most_supported(cache, found, of).map(|(rows, _)| rows)
 }
@@ -50,9 +46,14 @@ pub(crate) fn leaves_little(rows: &Rows, found: &SearchResult<'_>, fit: &FittedV
     is <= FAR * FAR && (fit.variant.effects.is_empty() || is_most_taken)
 }
 
-/// The rows in units of a noise as large as what these predictions leave, where that may be all noise.
-fn in_noise_of(rows: &Rows, predicted: &[f64]) -> Option<Rows> {
-    let larger = larger(rows, predicted);
+/// The rows in units of a noise as large as what these predictions leave, where that may be all noise, with the log density of the training
+/// rows less the price of that noise.
+fn in_noise_of(rows: &Rows, predicted: &[f64]) -> Option<(f64, Rows)> {
+    let as_large = AsLarge::new(rows, predicted);
+    let larger = as_large.believed(predicted);
+    // The size is one more number that is fitted (Schwarz 1978).
+    let n_size = as_large.factors.iter().filter(|factor| **factor > 1.0).count() as f64;
+    let log_density = as_large.log_density - 0.5 * n_size * (rows.train.len().max(1) as f64).ln();
     let mut rows = rows.clone();
     rows.noise.resize(rows.n_output(), None);
     for LargerNoise { output, factor, noise } in &larger {
@@ -61,33 +62,14 @@ fn in_noise_of(rows: &Rows, predicted: &[f64]) -> Option<Rows> {
             row.noise *= factor;
         }
     }
-    (!larger.is_empty() && !Adequacy::of_rows(&rows, predicted).is_gap()).then_some(rows)
+    let is_all = !larger.is_empty() && !Adequacy::of_rows(&rows, predicted).is_gap();
+    is_all.then_some((log_density, rows))
 }
 
 /// The outputs whose noise was found, by differences that take the slow part of a noise for signal, and whose residuals are all noise if
 /// theirs is as large as they are and correlated: white in units of that noise, and no larger where they were held out.
 pub(crate) fn larger(rows: &Rows, predicted: &[f64]) -> Vec<LargerNoise> {
-    let AsLarge { rows, factors, .. } = AsLarge::new(rows, predicted);
-    if Adequacy::of_rows(&rows, predicted).is_gap() {
-        return Vec::new();
-    }
-    let whitened = rows.whitened(predicted);
-    let squares = |output: usize, usage: Usage| -> Vec<f64> {
-        let of =
-            (0..rows.rows.len()).filter(|i| rows.rows[*i].output == output && rows.rows[*i].usage == usage);
-        of.map(|i| whitened[i].powi(2)).collect()
-    };
-    let is_as_large = |output: usize| {
-        let (unseen, n) = (squares(output, Usage::HeldOut), squares(output, Usage::Train).len());
-        let mean = unseen.iter().sum::<f64>() / unseen.len().max(1) as f64;
-        !is_larger(mean, unseen.len(), n as f64)
-    };
-    let with_memory = |(output, noise): (usize, &Option<CorrelatedNoise>)| {
-        let (factor, noise) = (factors[output], (*noise)?);
-        (factor > 1.0).then_some(LargerNoise { output, factor, noise })
-    };
-    let larger: Vec<LargerNoise> = rows.noise.iter().enumerate().filter_map(with_memory).collect();
-    if larger.iter().all(|of| is_as_large(of.output)) { larger } else { Vec::new() }
+    AsLarge::new(rows, predicted).believed(predicted)
 }
 
 /// The rows in units of a noise as large as the residuals, where it was found.
@@ -115,6 +97,31 @@ impl AsLarge {
         let grown: f64 = trained.map(|row| factors[row.output].ln()).sum();
         rows.noise = noise;
         Self { rows, factors, log_density: log_density - grown }
+    }
+
+    /// The noises with a memory, where these predictions leave nothing else.
+    fn believed(&self, predicted: &[f64]) -> Vec<LargerNoise> {
+        let Self { rows, factors, .. } = self;
+        if Adequacy::of_rows(rows, predicted).is_gap() {
+            return Vec::new();
+        }
+        let whitened = rows.whitened(predicted);
+        let squares = |output: usize, usage: Usage| -> Vec<f64> {
+            let is_of = |row: &Row| row.output == output && row.usage == usage;
+            let of = rows.rows.iter().zip(&whitened).filter(|(row, _)| is_of(row));
+            of.map(|(_, e)| e * e).collect()
+        };
+        let is_as_large = |output: usize| {
+            let (unseen, n) = (squares(output, Usage::HeldOut), squares(output, Usage::Train).len());
+            let mean = unseen.iter().sum::<f64>() / unseen.len().max(1) as f64;
+            !is_larger(mean, unseen.len(), n as f64)
+        };
+        let with_memory = |(output, noise): (usize, &Option<CorrelatedNoise>)| {
+            let (factor, noise) = (factors[output], (*noise)?);
+            (factor > 1.0).then_some(LargerNoise { output, factor, noise })
+        };
+        let larger: Vec<LargerNoise> = rows.noise.iter().enumerate().filter_map(with_memory).collect();
+        if larger.iter().all(|of| is_as_large(of.output)) { larger } else { Vec::new() }
     }
 }
 

@@ -67,9 +67,7 @@ impl Bad {
     pub(crate) fn reached(&self) -> (Solvers, SolverDef) {
         (Solvers::new(SiteOptions::default()), reaching(&self.folder.path().join("s")))
     }
-}
 
-impl Bad {
     /// Calls that were left before their end.
     pub(crate) fn left(&self) -> usize {
         self.left.load(Ordering::Relaxed)
@@ -104,9 +102,7 @@ impl Service {
             server.serve_with_incoming(incoming).await.unwrap();
         });
     }
-}
 
-impl Service {
     /// A stream of these messages that ends so much later.
     fn stream(
         &self,
