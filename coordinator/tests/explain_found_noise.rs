@@ -8,7 +8,7 @@ mod study_kit;
 use explained_kit::{displayed, explained};
 use reactor_kit::{NOISE, measured, reactor};
 use starlings_coordinator::explain::{Explanation, Verdict};
-use study_kit::Case;
+use study_kit::{Case, csv, grid};
 
 /// Hours of the batch, and how many of them train.
 const SPAN: [f64; 2] = [24.0, 16.0];
@@ -50,4 +50,93 @@ fn what_is_missing_is_named_whether_the_noise_with_a_memory_was_stated_or_not() 
         let condition = "That is if the noise, whose size the study does not state, is correlated in time";
         assert_eq!(found.headline.contains(condition), !is_stated, "{}", found.headline);
     }
+}
+
+/// A converter whose coil has no resistance, beside the duty that it was given.
+const CONVERTER: &str = r#"
+[study]
+name = "converter"
+seed = 1
+time_unit = "s"
+
+[model]
+kind = "equations"
+outputs = [ { name = "current", unit = "A", value = "i" }, { name = "voltage", unit = "V", value = "v" } ]
+inputs = [ { name = "duty" } ]
+constants = { Vin = 24 }
+
+[[model.states]]
+name = "i"
+unit = "A"
+initial = 0
+rate = "(duty*Vin - v)/L"
+
+[[model.states]]
+name = "v"
+unit = "V"
+initial = 0
+rate = "(i - v/R)/C"
+
+[[parameters]]
+name = "L"
+unit = "H"
+prior = { transform = "log", median = 1e-4, factor = 3.0 }
+
+[[parameters]]
+name = "C"
+unit = "F"
+prior = { transform = "log", median = 1e-4, factor = 3.0 }
+
+[[parameters]]
+name = "R"
+unit = "ohm"
+prior = { transform = "log", median = 10, factor = 2.0 }
+
+[[records]]
+name = "scope"
+file = "scope.csv"
+channels = [
+    { column = "current", output = "current", noise = "auto" },
+    { column = "voltage", output = "voltage", noise = "auto" },
+]
+inputs = { duty = "duty" }
+train = [0.0, 0.0025]
+"#;
+
+/// What an oscilloscope shows of it: the coil has a resistance, and the duty changes at once and not between two samples.
+fn oscillogram() -> String {
+    let times = grid(400, 1e-5);
+    let duty = |t: f64| {
+        if t < 0.99995e-3 {
+            0.3
+        } else if t < 2.19995e-3 {
+            0.6
+        } else {
+            0.4
+        }
+    };
+    let (mut i, mut v, mut current, mut voltage) = (0.0, 0.0, Vec::new(), Vec::new());
+    for t in &times {
+        current.push(i);
+        voltage.push(v);
+        for k in 0..100 {
+            i += 1e-7 * (24.0 * duty(t + 1e-7 * f64::from(k)) - v - 0.35 * i) / 220e-6;
+            v += 1e-7 * (i - v / 8.0) / 47e-6;
+        }
+    }
+    let (current, voltage) = (displayed(&current, 0.03, 0.02, 1), displayed(&voltage, 0.06, 0.05, 2));
+    let duty: Vec<f64> = times.iter().map(|t| duty(*t)).collect();
+    csv("time,duty,current,voltage", &[&times, &duty, &current, &voltage])
+}
+
+#[test]
+fn where_nothing_explains_the_gap_beside_a_larger_noise_either_that_is_not_assumed() {
+    let found = explained(&Case::new(CONVERTER, &[("scope.csv", oscillogram())])).unwrap();
+    assert_eq!(found.verdict, Verdict::Unexplained, "{}", found.headline);
+    assert_eq!(found.correlated_noise, [], "the noise is the one that was found: {}", found.headline);
+    assert!(
+        !found.warnings.iter().any(|warning| warning.contains("stands and falls")),
+        "{:?}",
+        found.warnings
+    );
 }
