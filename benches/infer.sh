@@ -10,7 +10,7 @@ folder="$(mktemp -d)"
 trap 'rm -r "$folder"' EXIT
 cd "$folder"
 cp "$example"/*.toml "$example"/start.csv .
-sed -i 's/^max_steps = .*/max_steps = 100000000/' truth.toml
+sed -i 's/^max_steps = .*/max_steps = 10000000000/' truth.toml
 for until in ${UNTIL:-3000 30000}; do
   "$starlings" simulate truth.toml --until "$until" --step 0.005 -o data.csv 2> /dev/null
   rows="$(($(wc -l < data.csv) - 1))"
