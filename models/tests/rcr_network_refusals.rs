@@ -187,6 +187,8 @@ fn chambers_and_what_belongs_to_them_are_refused_where_they_do_not_fit() {
     );
     let half = json!({ "name": "lv", "kind": "chamber", "from": "a", "active": 2.0, "wall": 9.0 });
     refused(json!([half, r("out", "a", "0")]), "elements[0]", &["`wall` and `stiffening`, or neither"]);
+    let soft = json!({ "name": "lv", "kind": "chamber", "from": "a", "active": 0.1, "passive": 2.0 });
+    refused(json!([soft, r("out", "a", "0")]), "elements[0].active", &["softer active", "exchanged"]);
     let under = json!({ "name": "muscle", "kind": "C", "from": "m", "around": "b" });
     let elements = json!([under, r("x", "m", "b"), r("y", "b", "0")]);
     refused(elements, "elements[0].around", &["no chamber to the ground is at node `b`"]);

@@ -23,6 +23,7 @@ impl Assembly {
         let active =
             self.value(element, path, Measure::Elastance, ("active", "Emax", element.active.as_ref()))?;
         let passive = element.passive.as_ref().unwrap_or(&zero);
+        contracts(element, path)?;
         let passive = self.value(element, path, Measure::Elastance, ("passive", "Emin", Some(passive)))?;
         let rest = element.rest.as_ref().unwrap_or(&zero);
         let rest = self.value(element, path, Measure::Volume, ("rest", "V0", Some(rest)))?;
@@ -94,5 +95,20 @@ impl Assembly {
         let kind = TieKind::Under { state, compliance, share, around: Around { node, tie: usize::MAX } };
         self.circuit.ties.push(Tie { ends, kind, says: name.to_owned(), path: path.to_owned() });
         Ok(FlowOf::Tie(self.circuit.ties.len() - 1))
+    }
+}
+
+/// That a chamber is stiffer active than at rest, as far as the values are numbers.
+fn contracts(element: &Element, path: &str) -> Result<(), SetupError> {
+    match (&element.active, &element.passive) {
+        (Some(Value::Number(active)), Some(Value::Number(passive))) if active < passive => {
+            let message = format!(
+                "`{}` is softer active than at rest, elastance {active} below {passive}, and would fill as it contracts: are the two \
+                 exchanged?",
+                element.name
+            );
+            Err(fault(&format!("{path}.active"), message))
+        }
+        _ => Ok(()),
     }
 }
