@@ -148,6 +148,61 @@ fn a_term_that_nobody_listed_is_proposed_by_its_form() {
     assert!(found.explained_study.is_some() && said.contains("not its cause"), "{said}");
 }
 
+/// A drop that loses diameter at a steady rate.
+const DROP: &str = r#"
+[study]
+name = "drop"
+seed = 1
+time_unit = "s"
+
+[model]
+kind = "equations"
+outputs = [ { name = "diameter", unit = "mm", value = "d" } ]
+
+[[model.states]]
+name = "d"
+unit = "mm"
+initial = 1.2
+rate = "-k"
+
+[[parameters]]
+name = "k"
+unit = "mm/s"
+prior = { transform = "linear", median = 0.01, sd = 0.01 }
+
+[[records]]
+name = "drop"
+file = "drop.csv"
+time = "time"
+channels = [ { column = "diameter", output = "diameter", noise = 0.004 } ]
+train = [0.0, 40.0]
+"#;
+
+/// Evaporation in still air, by which the square of the diameter falls steadily (Spalding 1953).
+const EVAPORATION: &str = r#"
+[[effects]]
+name = "evaporation"
+says = "Evaporation in still air."
+adds = [ { to = "d", term = "-b/d" } ]
+parameters = [ { name = "b", unit = "mm^2/s", range = [0, 1] } ]
+"#;
+
+#[test]
+fn a_rate_that_goes_with_one_over_a_state_is_proposed_by_its_form() {
+    let times = grid(100, 0.5);
+    let blank = csv("time,diameter", &[&times, &vec![1.0; times.len()]]);
+    let truth = Case::new(&format!("{DROP}{EVAPORATION}"), &[("drop.csv", blank)]);
+    let noisy = noisy(&truth, &[("k", 0.003)], ("evaporation", 0.01), "diameter", 0.004);
+    let study = Case::new(DROP, &[("drop.csv", csv("time,diameter", &[&times, &noisy]))]);
+    let found = explained(&study).unwrap();
+    let said = &found.headline;
+    assert!(matches!(found.verdict, Verdict::Named | Verdict::Tie), "{said}");
+    assert_eq!(found.effects[0].name, "inverse:d:d", "{said}");
+    let amplitude = &found.effects[0].parameters[0];
+    assert!((amplitude.estimate + 0.01).abs() < 4.0 * amplitude.sd, "{amplitude:?}");
+    assert_eq!(amplitude.unit, "mm^2/s");
+}
+
 #[test]
 fn states_without_a_role_yield_a_term_by_its_form_and_no_error_of_a_sensor() {
     for (span, train, held_out) in

@@ -1,4 +1,4 @@
-//! The grammar of terms that an equation may lack: powers, products, directions, limits and trends of the states and inputs.
+//! The grammar of terms that an equation may lack: powers, inverses, products, directions, limits and trends of the states and inputs.
 //!
 //! Dimensions are carried by the coefficient, so that a term is possible wherever nothing but numbers enters a function; what needs a
 //! scale takes it from the course of its quantity. A factor of constant sign has no direction and no size of its own. Next file to
@@ -14,7 +14,7 @@ use crate::locate::Track;
 
 /// Quantities that enter at most, those of the study's order: the number of terms grows with its square.
 const MOST: usize = 6;
-/// Part of a quantity's swing below which its root goes straight to zero.
+/// Part of a quantity's swing below which its root and its inverse go straight to zero.
 const WIDTH: f64 = 0.02;
 
 /// A state or input with the ends of its course.
@@ -35,6 +35,11 @@ impl Signal<'_> {
 
     fn changes_sign(&self) -> bool {
         self.ends[0] < 0.0 && self.ends[1] > 0.0
+    }
+
+    /// Whether zero lies outside of its course, farther than a root is rounded.
+    fn keeps_from_zero(&self) -> bool {
+        self.ends[0] > WIDTH * self.swing() || self.ends[1] < -WIDTH * self.swing()
     }
 }
 
@@ -100,6 +105,12 @@ impl Equation<'_> {
         });
         let root = format!("goes with the square root of the size of {x}");
         self.add("root", &[(q, 0.5)], 0.0, &root, |k| format!("{k}*{x}/sqrt(abs({x}) + {width:?})"));
+        if q.keeps_from_zero() {
+            let inverse = format!("goes with one over {x}");
+            self.add("inverse", &[(q, -1.0)], 0.0, &inverse, |k| {
+                format!("{k}*{x}/({x}^2 + {:?})", width * width)
+            });
+        }
         if q.changes_sign() {
             let square = format!("goes with the square of {x} and has its sign");
             self.add("odd-square", &[(q, 2.0)], 0.0, &square, |k| format!("{k}*{x}*abs({x})"));
