@@ -63,6 +63,15 @@ fn a_run_in_lets_the_model_settle_before_the_first_measured_row() {
 }
 
 #[test]
+fn inputs_before_the_first_measured_row_are_told_until_the_study_says_where_the_run_begins() {
+    for (record, told) in [("", true), ("start = 0.0", false), ("start = -3.0", false)] {
+        let warnings = filter(record).study().warnings;
+        let says = "record `step` begins with its first measured row, at 0: its inputs from -3 on";
+        assert_eq!(warnings.iter().any(|w| w.contains(says)), told, "{record}: {warnings:?}");
+    }
+}
+
+#[test]
 fn a_run_that_would_begin_late_or_without_its_input_is_refused() {
     let late = fault(&filter("start = 0.5"));
     assert!(late.contains("record `step` starts at 0.5, after its first measured row"), "{late}");

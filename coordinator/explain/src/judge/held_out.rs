@@ -27,8 +27,9 @@ const FIRST_ORDER: f64 = 0.05;
 const SHARE_OF_EACH: f64 = 0.25;
 /// ... and leave no more than this root mean square over the noise beyond the uncertainty of the estimate ...
 pub(super) const FAR: f64 = 2.5;
-/// ... unless it takes away this share of a span of a fitted channel: what it leaves there is the smaller part by far, however well the
-/// noise lets it be seen. A channel that is never fitted excuses nothing.
+/// ... unless the squares of its errors on a span of a fitted channel fell by this share: what it leaves there is the smaller part by far,
+/// however well the noise lets it be seen. What the uncertainty of the estimate explains does not count here: it grows with what the fit
+/// leaves. A channel that is never fitted excuses nothing.
 const MOST: f64 = 0.75;
 /// Channels that a sentence names at most.
 const NAMED: usize = 3;
@@ -58,6 +59,11 @@ pub struct HeldOut {
 }
 
 impl HeldOut {
+    /// Share of the mean square of the model's errors that went away.
+    fn fell(&self) -> f64 {
+        1.0 - (self.after / self.before).powi(2)
+    }
+
     /// Channel and errors in words: `product (never fitted) at 4.60 times its noise, 4.21 times beyond the uncertainty of
     /// the estimate`.
     pub fn says(&self, several_records: bool) -> String {
@@ -150,7 +156,7 @@ fn groups(rows: &[Row]) -> Vec<Vec<usize>> {
 pub(crate) fn forbidding<'h>(adequacy: &Adequacy, of: &'h [HeldOut]) -> Vec<&'h HeldOut> {
     let strict = adequacy.could_be_white();
     let is_span = |h: &HeldOut| h.usage == Usage::HeldOut.word();
-    let far = |h: &HeldOut| h.beyond > FAR && !(is_span(h) && h.mended >= MOST);
+    let far = |h: &HeldOut| h.beyond > FAR && !(is_span(h) && h.fell() >= MOST);
     of.iter().filter(|h| h.fails && (strict || h.mended < SHARE_OF_EACH || far(h))).collect()
 }
 
@@ -217,8 +223,9 @@ mod tests {
             1,
             "a channel that no fit has seen"
         );
-        let span = HeldOut { usage: "held-out".to_owned(), ..channel(17.0, 15.0, 0.9) };
-        assert!(forbidding(&correlated, &[span]).is_empty(), "something smaller remains");
+        let span = |before: f64| HeldOut { usage: "held-out".to_owned(), before, ..channel(17.0, 15.0, 0.9) };
+        assert!(forbidding(&correlated, &[span(60.0)]).is_empty(), "something smaller remains");
+        assert_eq!(forbidding(&correlated, &[span(25.0)]).len(), 1, "its uncertainty excuses what it leaves");
     }
 
     #[test]

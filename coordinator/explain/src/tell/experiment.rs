@@ -22,6 +22,8 @@ use crate::run_cache::RunCache;
 const NEW_CHANNEL: f64 = 0.03;
 /// Difference in χ² up to which a verdict can call two variants tied.
 const SEPARATED: f64 = 12.0;
+/// Difference in χ² beyond which its size says nothing: any two such versions are told apart, and one of them may have left where it holds.
+const PLAIN: f64 = 1e6;
 /// Difference of two courses that are one quantity, as a share of its spread.
 const SAME: f64 = 1e-9;
 /// Factor on the swing of an input, and its inverse.
@@ -61,7 +63,11 @@ impl Experiment {
     /// What the best of the simulated experiments is worth, in one sentence.
     pub fn sentence(&self) -> String {
         // Differences by rounding count as zero.
-        let figure = |chi2: f64| three(if chi2 < 1e-3 { 0.0 } else { chi2 });
+        let figure = |chi2: f64| match chi2 {
+            _ if chi2 < 1e-3 => three(0.0),
+            _ if chi2 > PLAIN => "more than a million".to_owned(),
+            _ => three(chi2),
+        };
         let (separation, now) = (figure(self.separation), figure(self.separation_now));
         let of = if self.between.is_empty() { "them".to_owned() } else { self.between.join(" and ") };
         if self.separation < SEPARATED {
@@ -218,6 +224,17 @@ fn separations(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_difference_beyond_every_doubt_is_not_told_to_its_last_power() {
+        let says = |separation: f64| {
+            let between = vec!["leak".to_owned(), "drag".to_owned()];
+            let (says, tried) = ("record twice as long".to_owned(), Vec::new());
+            Experiment { says, between, separation, separation_now: 3.0, tried }.sentence()
+        };
+        assert!(says(1.77e52).contains("χ² of more than a million at most"), "{}", says(1.77e52));
+        assert!(says(2e5).contains("χ² of 200000 at most"), "{}", says(2e5));
+    }
 
     #[test]
     fn a_state_that_an_output_shows_as_it_is_needs_no_channel_of_its_own() {

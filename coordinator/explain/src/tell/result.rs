@@ -104,6 +104,9 @@ pub struct NamedEffect {
     pub says: String,
     /// Where it enters and by which term: (to, term).
     pub adds: Vec<(String, String)>,
+    /// Its own states with their rates: (name, rate).
+    #[serde(default)]
+    pub states: Vec<(String, String)>,
     /// Its parameters, the amplitude first.
     pub parameters: Vec<Coefficient>,
     /// What can look the same in data.
@@ -116,12 +119,13 @@ pub struct NamedEffect {
 }
 
 impl NamedEffect {
-    /// Its terms as equations: a term is added to the rate of a state, and to the value of anything else.
+    /// Its terms as equations: a term is added to the rate of a state, and to the value of anything else. Its own states follow.
     ///
     /// `states` are the names of the model's states.
     pub fn equations(&self, states: &[String]) -> Vec<String> {
         let left = |to: &String| if states.contains(to) { format!("d {to}/dt") } else { to.clone() };
-        self.adds.iter().map(|(to, term)| format!("{} += {term}", left(to))).collect()
+        let terms = self.adds.iter().map(|(to, term)| format!("{} += {term}", left(to)));
+        terms.chain(self.states.iter().map(|(name, rate)| format!("d {name}/dt = {rate}"))).collect()
     }
 }
 

@@ -45,6 +45,7 @@ pub(crate) fn effects(judged: &JudgedFit<'_>) -> Vec<NamedEffect> {
             name: def.name.clone(),
             says: def.says.clone(),
             adds: def.adds.iter().map(|a| (a.to.clone(), a.term.clone())).collect(),
+            states: def.states.iter().map(|state| (state.name.clone(), state.rate.clone())).collect(),
             parameters: def.parameters.iter().enumerate().map(coefficient).collect(),
             confounders: def.confounders.clone(),
             source: def.source.clone(),

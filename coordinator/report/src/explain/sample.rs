@@ -66,6 +66,7 @@ fn effect() -> NamedEffect {
         name: "characteristic-impedance".into(),
         says: "The inlet pressure rises with the flow itself.".into(),
         adds: vec![("pressure".into(), "Zc*flow".into()), ("p".into(), "-leak*p".into())],
+        states: vec![("wall".into(), "-wall/tau".into())],
         parameters: vec![coefficient],
         confounders: vec!["inertance".into(), "a gain of the flow meter".into()],
         source: "Westerhof, Lankhaar & Westerhof (2009)".into(),

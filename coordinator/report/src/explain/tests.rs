@@ -86,6 +86,7 @@ fn a_named_effect_is_told_with_its_equations_and_its_coefficient() {
         "The inlet pressure rises with the flow itself.",
         "pressure += Zc*flow",
         "d p/dt += -leak*p",
+        "d wall/dt = -wall/tau",
         "<b>0.0943</b> <small>± 0.0022</small>",
         "0.0901 to 0.0987",
         "inertance, a gain of the flow meter.",

@@ -2,6 +2,9 @@
 //!
 //! Next file to read: [`super::channel`].
 
+use starlings_models::{Signal, Spec};
+
+use super::Table;
 use crate::checked::Channel;
 use crate::file::RecordSection;
 use crate::problem::Source;
@@ -20,6 +23,34 @@ pub(super) fn of_run(source: &Source, section: &RecordSection, times: &[f64]) ->
         format!("`start` begins the run earlier, so that the model settles: give {first} or less; `train` leaves rows out"),
     );
     None
+}
+
+/// Inputs in rows of the record's own file before the first measured one: a dose that is given before the first sample, say. An input of
+/// another file keeps its own times.
+pub(super) fn inputs_before(
+    section: &RecordSection,
+    table: &Table,
+    times: &[f64],
+    inputs: &[Signal],
+    spec: &Spec,
+) -> Option<String> {
+    let first = *times.first()?;
+    let is_own = |name: &String| {
+        section
+            .inputs
+            .iter()
+            .any(|(input, column)| input.get_ref() == name && table.csv.headers.contains(column.get_ref()))
+    };
+    let own = spec.inputs.iter().zip(inputs).filter(|(input, _)| is_own(&input.name));
+    let earliest = own.filter_map(|(_, signal)| signal.times.first().copied()).reduce(f64::min)?;
+    (section.start.is_none() && earliest < first).then(|| {
+        format!(
+            "record `{}` begins with its first measured row, at {first}: its inputs from {earliest} on act before that on nothing but \
+             delays. Write `start = {earliest}` in the record where the model is to feel them, with its initial values at that time; \
+             `start = {first}` keeps the run as it is.",
+            section.name.get_ref()
+        )
+    })
 }
 
 /// The span of the first rows of a held-out record that its initial values are found from; `None` where the study gives none, or
