@@ -14,6 +14,15 @@ fn fault(case: &Case) -> String {
 
 /// A low pass of an input that is 1 throughout, which begins at zero: y = 1 − exp(−(t − start)/tau).
 fn filter(record: &str) -> Case {
+    let times: Vec<f64> = (0..60).map(|i| 0.1 * f64::from(i) - 3.0).collect();
+    // Nothing is measured before t = 0.
+    let y: Vec<f64> = times.iter().map(|t| if *t < -1e-9 { f64::NAN } else { 0.9 }).collect();
+    let recording = csv("time,u,y", &[&times, &vec![1.0; 60], &y]);
+    filter_with("u = \"u\"", record, &[("step.csv", recording)])
+}
+
+/// The same with this input, of these files.
+fn filter_with(input: &str, record: &str, files: &[(&str, String)]) -> Case {
     let study = format!(
         r#"
 [study]
@@ -33,15 +42,12 @@ prior = {{ transform = "log", median = 1.0, factor = 2.0 }}
 [[records]]
 name = "step"
 file = "step.csv"
-inputs = {{ u = "u" }}
+inputs = {{ {input} }}
 channels = [ {{ column = "y", output = "shown", noise = 0.01 }} ]
 {record}
 "#
     );
-    let times: Vec<f64> = (0..60).map(|i| 0.1 * f64::from(i) - 3.0).collect();
-    // Nothing is measured before t = 0.
-    let y: Vec<f64> = times.iter().map(|t| if *t < -1e-9 { f64::NAN } else { 0.9 }).collect();
-    Case::new(&study, &[("step.csv", csv("time,u,y", &[&times, &vec![1.0; 60], &y]))])
+    Case::new(&study, files)
 }
 
 #[test]
@@ -69,6 +75,11 @@ fn inputs_before_the_first_measured_row_are_told_until_the_study_says_where_the_
         let says = "record `step` begins with its first measured row, at 0: its inputs from -3 on";
         assert_eq!(warnings.iter().any(|w| w.contains(says)), told, "{record}: {warnings:?}");
     }
+    let times = grid(60, 0.1);
+    let (drive, shown) =
+        (csv("time,u", &[&[-3.0, 9.0], &[1.0, 1.0]]), csv("time,y", &[&times, &vec![0.9; 60]]));
+    let elsewhere = filter_with("u = \"drive.csv:u\"", "", &[("step.csv", shown), ("drive.csv", drive)]);
+    assert!(elsewhere.study().warnings.iter().all(|w| !w.contains("first measured row")), "its own times");
 }
 
 #[test]

@@ -139,7 +139,13 @@ fn an_activation_is_read_beside_the_values_of_a_chamber_and_among_them() {
     let path = folder.path().join("bad.json");
     among["values"]["activation_type"] = json!(7);
     beside["type"] = json!("RegazzoniChamber");
-    let cases = [(among, "activation_type: 7 is not 0, 1 or 2"), (beside, "write `PiecewiseCosineChamber`")];
+    let mut soft = twitching();
+    soft["values"]["Emax"] = json!(0.05);
+    let cases = [
+        (among, "activation_type: 7 is not 0, 1 or 2"),
+        (beside, "write `PiecewiseCosineChamber`"),
+        (soft, "`ventricle` is softer active than at rest"),
+    ];
     for (chamber, words) in cases {
         std::fs::write(&path, beating(&chamber).to_string()).unwrap();
         let out = folder.path().join("bad");

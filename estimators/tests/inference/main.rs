@@ -21,5 +21,6 @@ mod missing;
 mod mixing;
 mod motor;
 mod properties;
+mod robust;
 mod tanks;
 mod varying;

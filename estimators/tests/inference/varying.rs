@@ -1,75 +1,14 @@
-//! Noise that is not constant: it is told, no other fault is told as that, and intervals hold under it.
+//! Noise that is not constant: it is told, and no other fault is told as that.
 
 use std::sync::Arc;
 
-use nalgebra::DMatrix;
 use starlings_estimators::inference::{
-    Basis, Diffusion, Fit, Function, Pairs, Polynomial, Posterior, Rule, Structure, Varying, With,
-    lag_spread, noise_checks, varying,
+    Basis, Diffusion, Fit, Polynomial, Rule, Structure, With, lag_spread, noise_checks, varying,
 };
 
+use crate::kit::noise::{H, RATE, asked, line, pairs, path, polynomial};
 use crate::kit::sde::{gauss, record, rng};
-use crate::kit::{lorenz, motor, sd, sums, tanks, times};
-
-/// Rate of false alarms that is asked for.
-const RATE: f64 = 1e-3;
-const H: f64 = 0.02;
-
-/// Pairs of a recording in blocks of 256 steps.
-fn pairs<const N: usize>(rows: &[[f64; N]], h: f64) -> Pairs {
-    pairs_of(rows, h, |_| 256)
-}
-
-/// Pairs of a recording in blocks of as many steps as there are to be from each row on.
-fn pairs_of<const N: usize>(rows: &[[f64; N]], h: f64, n_step: impl Fn(usize) -> usize) -> Pairs {
-    let times = times(rows.len(), h);
-    let (mut all, mut to) = (Pairs::new(N), 0);
-    while to + 1 < rows.len() {
-        let from = to;
-        to = (from + n_step(from)).min(rows.len() - 1);
-        let block = Pairs::of_block(&times[from..=to], rows[from..=to].as_flattened(), N, to - from);
-        all.merge(&block).unwrap();
-    }
-    all
-}
-
-/// Rows of dx = drift dt + size dW (Itô) in steps of h, each of twenty by Euler's rule; both are of the time and of x.
-fn path(
-    seed: u64,
-    n: usize,
-    drift: impl Fn(f64, f64) -> f64,
-    size: impl Fn(f64, f64) -> f64,
-) -> Vec<[f64; 1]> {
-    let mut draw = rng(seed);
-    record(n, (H, 20), [1.0], |t, h, [x]| [x + h * drift(t, *x) + size(t, *x) * h.sqrt() * gauss(&mut draw)])
-}
-
-fn polynomial(degree: u32, constant: bool) -> Arc<Basis> {
-    let family = Polynomial::new(&["x"], 1, &[0], degree, constant);
-    Arc::new(Basis::new(1, 0).with(Rule::MidPoint, family).unwrap())
-}
-
-/// A fit of constant noise with what it says of others.
-struct Asked {
-    constant: Posterior,
-    robust: Posterior,
-    told: Vec<Varying>,
-}
-
-fn asked<const N: usize>(basis: &Arc<Basis>, structure: &Structure, rows: &[[f64; N]], h: f64) -> Asked {
-    let fit = Fit::new(Diffusion::Diagonal, structure.n_coefficient());
-    let constant = fit.posterior(&sums(basis, rows, h), structure).unwrap();
-    let pairs = pairs(rows, h);
-    let told = varying(&pairs, basis, constant.drift(), h, RATE).unwrap();
-    let robust = fit.robust(&constant, &pairs, (basis, structure), h).unwrap();
-    Asked { constant, robust, told }
-}
-
-fn line() -> (Arc<Basis>, Structure) {
-    let basis = polynomial(1, true);
-    let structure = Structure::same(&basis, &["x"]).unwrap();
-    (basis, structure)
-}
+use crate::kit::{lorenz, motor, sd, sums, tanks};
 
 #[test]
 fn constant_noise_is_told_to_vary_as_rarely_as_stated() {
@@ -151,94 +90,6 @@ fn the_state_that_the_noise_of_another_depends_on_is_named() {
     assert!(found[0].at[0] < found[0].at[1], "{found:?}");
 }
 
-/// Numbers of 90 % intervals of 100 that hold the truth, by coefficient: of constant noise, and of any.
-fn held(degree: u32, constant: bool, n: usize, truth: &[f64], size: impl Fn(f64) -> f64) -> Vec<[i32; 2]> {
-    let basis = polynomial(degree, constant);
-    let structure = Structure::same(&basis, &["x"]).unwrap();
-    let drift = |x: f64| {
-        let powers = (i32::from(!constant)..).zip(truth);
-        powers.map(|(power, c)| c * x.powi(power)).sum::<f64>()
-    };
-    let mut held = vec![[0; 2]; truth.len()];
-    for seed in 0..100 {
-        let rows = path(500 + seed, n, |_, x| drift(x), |_, x| size(x));
-        let found = asked(&basis, &structure, &rows, H);
-        assert_eq!(found.told.len(), 1, "seed {seed}");
-        for (k, (held, truth)) in held.iter_mut().zip(truth).enumerate() {
-            for (held, of) in held.iter_mut().zip([&found.constant, &found.robust]) {
-                let [lo, hi] = of.interval(k, 0.9).unwrap();
-                *held += i32::from(lo <= *truth && *truth <= hi);
-            }
-        }
-    }
-    println!("degree {degree}: of 100 hold {truth:?}, constant and any: {held:?}");
-    held
-}
-
-/// Three of a hundred are the sd of each.
-#[test]
-fn intervals_hold_where_the_noise_varies_and_those_of_constant_noise_do_not() {
-    for [before, after] in held(1, false, 5000, &[-1.0], |x| 0.3 + 0.7 * x.abs()) {
-        assert!(before < 75 && after >= 82, "{before} and {after}");
-    }
-    for [before, after] in held(1, true, 5000, &[1.0, -1.0], |x| 0.5 * x) {
-        assert!(before < 82 && after >= 82, "{before} and {after}");
-    }
-    let cubic = held(3, true, 10_000, &[0.0, 1.0, 0.0, -1.0], |x| 0.2 + 0.6 * x.abs());
-    assert!(cubic.iter().all(|[_, after]| *after >= 77), "{cubic:?}");
-    assert!(cubic[1][0] < 10 && cubic[3][0] < 10, "x and x³ are off without: {cubic:?}");
-}
-
-#[test]
-fn a_sample_of_a_long_recording_gives_the_intervals_that_all_of_it_does() {
-    let (basis, structure) = (polynomial(3, true), |basis: &Basis| Structure::same(basis, &["x"]).unwrap());
-    let structure = structure(&basis);
-    let rows = path(11, 150_000, |_, x| x - x.powi(3), |_, x| 0.2 + 0.6 * x.abs());
-    let found = asked(&basis, &structure, &rows, H);
-    let mut whole: Option<DMatrix<f64>> = None;
-    for part in rows.windows(25_001).step_by(25_000) {
-        let robust = asked(&basis, &structure, part, H).robust;
-        whole = Some(robust.precision() + whole.unwrap_or_else(|| DMatrix::zeros(4, 4)));
-    }
-    let whole = whole.unwrap().try_inverse().unwrap();
-    for (k, truth) in [0.0, 1.0, 0.0, -1.0].into_iter().enumerate() {
-        let of = found.robust.estimates[k].value.unwrap();
-        let ratio = of.sd / whole[(k, k)].sqrt();
-        // What moves is known from a ninth of the steps.
-        assert!((0.75..1.5).contains(&ratio), "{k}: {ratio}");
-        assert!((of.mean - truth).abs() < 3.5 * of.sd, "{k}: {of:?}");
-    }
-}
-
-#[test]
-fn intervals_are_the_same_however_the_recording_was_cut_into_blocks() {
-    let (basis, structure) = line();
-    // The first tenth, in short blocks, is three times as noisy as the rest, in long ones.
-    let rows = path(13, 100_000, |_, x| -x, |t, _| if t < 200.0 { 1.5 } else { 0.5 });
-    let fit = Fit::new(Diffusion::Diagonal, structure.n_coefficient());
-    let constant = fit.posterior(&sums(&basis, &rows, H), &structure).unwrap();
-    let of = |n_step: &dyn Fn(usize) -> usize| {
-        let pairs = pairs_of(&rows, H, n_step);
-        let robust = fit.robust(&constant, &pairs, (&basis, &structure), H).unwrap();
-        [0, 1].map(|k| robust.estimates[k].value.unwrap().sd)
-    };
-    let (even, uneven) = (of(&|_| 256), of(&|from| if from < 10_000 { 100 } else { 30_000 }));
-    for (even, uneven) in even.into_iter().zip(uneven) {
-        // 1536 of the 6536 pairs of the second stand for nine tenths of the steps: a fortieth, and more where few of them weigh.
-        assert!((uneven / even - 1.0).abs() < 0.1, "{even} {uneven}");
-    }
-}
-
-#[test]
-fn constant_noise_keeps_its_intervals() {
-    let found = asked(&line().0, &line().1, &path(5, 20_000, |_, x| -x, |_, _| 0.5), H);
-    for (constant, robust) in found.constant.estimates.iter().zip(&found.robust.estimates) {
-        let [constant, robust] = [constant, robust].map(|of| of.value.unwrap());
-        assert!((robust.sd / constant.sd - 1.0).abs() < 0.04, "{constant:?} {robust:?}");
-        assert!((robust.mean - constant.mean).abs() < 1e-9, "a line has one slope: {constant:?} {robust:?}");
-    }
-}
-
 #[test]
 fn other_faults_of_a_recording_are_not_told_as_noise_that_varies() {
     let (basis, structure) = line();
@@ -263,22 +114,6 @@ fn other_faults_of_a_recording_are_not_told_as_noise_that_varies() {
         let rows = motor::recording(seed, 500, 1.0, |t| if t < 0.25 { 1.0 } else { 0.7 });
         assert_eq!(asked(&basis, &motor::throat(&basis), &rows, 0.001).told, [], "motor");
     }
-}
-
-#[test]
-fn functions_at_the_left_point_are_not_moved() {
-    let square = || Function::new("x^2", |_, x| x[0] * x[0], |_, x, slopes| slopes[0] = 2.0 * x[0]);
-    let of = |rule| Arc::new(Basis::new(1, 0).with(rule, square()).unwrap());
-    let rows = path(9, 20_000, |_, x| 1.0 - x * x, |_, x| 0.4 * x.abs());
-    let one = |basis: &Arc<Basis>| {
-        let structure = Structure::same(basis, &["x^2"]).unwrap();
-        asked(basis, &structure, &rows, H)
-    };
-    let (left, mid) = (one(&of(Rule::LeftPoint)), one(&of(Rule::MidPoint)));
-    let mean = |posterior: &Posterior| posterior.mean()[0];
-    assert!((mean(&left.robust) - mean(&left.constant)).abs() < 1e-12);
-    let (off, sd) = (mean(&mid.constant) - mean(&mid.robust), mid.robust.estimates[0].value.unwrap().sd);
-    assert!(off.abs() > 0.5 * sd, "the mid-point's own is off: {off} ± {sd}");
 }
 
 #[test]

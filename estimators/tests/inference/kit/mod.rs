@@ -6,6 +6,7 @@ pub mod fhn;
 pub mod lorenz;
 pub mod motor;
 pub mod neutral;
+pub mod noise;
 pub mod sde;
 pub mod tanks;
 
