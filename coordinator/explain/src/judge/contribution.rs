@@ -1,8 +1,10 @@
 //! Whether every effect of a variant contributes its share to the narrowing of the gap.
 //!
 //! A further effect that contributes less is not named. It shows that the form of its partner is not quite right, or that a
-//! discrepancy of another kind remains. Next file to read: [`super::verdict`].
+//! discrepancy of another kind remains; unless it settles that one, so that nothing but noise is left, however small it is beside what its
+//! partner takes away. Next file to read: [`super::verdict`].
 
+use super::gates::JudgedFit;
 use super::misfit::Misfit;
 use super::search_result::SearchResult;
 
@@ -41,10 +43,7 @@ pub(crate) fn check_contributions(found: &SearchResult<'_>, passing: &[usize]) -
     });
     let Some(alone) = alone else { return all };
     let part = &found.judged[alone];
-    let (train, held_out) = shares(found, &whole.misfit, &part.misfit);
-    if carries_its_share(train, held_out) {
-        return all;
-    }
+    let Some((train, held_out)) = lacking_shares(found, whole, part) else { return all };
     // A contribution that does not recur in the held-out span does not come from the form of the effect.
     let is_small = train.max(held_out.unwrap_or(0.0)) < SMALL_SHARE;
     if is_small || held_out.is_some_and(|h| h < 0.3 * train) || found.judged[alone].inflation > DISCREPANT {
@@ -60,8 +59,23 @@ pub(crate) fn check_contributions(found: &SearchResult<'_>, passing: &[usize]) -
     ContributionCheck { best: alone, checked: alone, because: Some(because) }
 }
 
+/// The shares of a whole's fall of χ² that a further effect contributes beyond a part of it, where they are too small to name it.
+pub(crate) fn lacking_shares(
+    found: &SearchResult<'_>,
+    whole: &JudgedFit<'_>,
+    part: &JudgedFit<'_>,
+) -> Option<(f64, Option<f64>)> {
+    let (train, held_out) = shares(found, &whole.misfit, &part.misfit);
+    (!carries_its_share(train, held_out) && !settles(whole, part)).then_some((train, held_out))
+}
+
+/// Whether a further effect settles what its partner leaves: a discrepancy of another kind, of which nothing is left but noise, held out or not.
+fn settles(whole: &JudgedFit<'_>, part: &JudgedFit<'_>) -> bool {
+    part.inflation > DISCREPANT && !whole.adequacy.is_gap() && !whole.held_out.iter().any(|h| h.fails)
+}
+
 /// The share of a whole's fall of χ² that a part of it lacks: of the training rows, and of the held-out span where there is one.
-pub(crate) fn shares(found: &SearchResult<'_>, whole: &Misfit, part: &Misfit) -> (f64, Option<f64>) {
+fn shares(found: &SearchResult<'_>, whole: &Misfit, part: &Misfit) -> (f64, Option<f64>) {
     let share = |of: fn(&Misfit) -> f64| {
         let fall = of(&found.before) - of(whole);
         (of(part) - of(whole)) / fall.max(f64::MIN_POSITIVE)
@@ -71,7 +85,7 @@ pub(crate) fn shares(found: &SearchResult<'_>, whole: &Misfit, part: &Misfit) ->
 
 /// Whether a further effect carries its share of the fall of χ²: a tenth of what was held out, and of both on average. No fit has seen what was
 /// held out: what it shows makes up for a small share of the rest.
-pub(crate) fn carries_its_share(train: f64, held_out: Option<f64>) -> bool {
+fn carries_its_share(train: f64, held_out: Option<f64>) -> bool {
     match held_out {
         None => train >= SECOND_SHARE,
         Some(h) => h >= SECOND_SHARE && train >= SMALL_SHARE && 0.5 * (train + h) >= SECOND_SHARE,

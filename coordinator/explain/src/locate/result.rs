@@ -180,6 +180,9 @@ pub struct UnknownInput {
     pub sd: Vec<f64>,
     /// The state along the run, to plot the input against.
     pub at: Vec<f64>,
+    /// All scalar states along that run, by name, which the input and the data keep near what was measured.
+    #[serde(skip)]
+    pub states: Vec<(String, Vec<f64>)>,
     /// Log-likelihood gained over the model without it.
     pub log_likelihood_gain: f64,
     /// What the effects that were added give along the same run; empty where they add nothing to this equation.

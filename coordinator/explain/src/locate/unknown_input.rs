@@ -16,7 +16,7 @@ mod walk;
 use std::sync::Arc;
 
 use starlings_fleet::Fleet;
-use starlings_models::ObserverDef;
+use starlings_models::{ObserverDef, Spec};
 use starlings_study::Study;
 
 use self::candidate::{Candidate, candidates};
@@ -52,19 +52,36 @@ pub fn unknown_inputs(
     let thinned = thinned(study);
     let Some(record) = longest(&thinned) else { return Ok(Vec::new()) };
     let mut found = Vec::new();
+    let states = &thinned.spec.states;
+    let scalars: Vec<(&str, usize)> = states
+        .iter()
+        .filter(|q| q.size == 1)
+        .filter_map(|q| Some((q.name.as_str(), Spec::offset(states, &q.name)?)))
+        .collect();
     for candidate in candidates(&thinned, fleet, theta, record, runs)?.iter().take(MOST) {
-        let walk = Walk { study: &thinned, candidate, record, theta: thinned.theta_for(record, theta) };
+        let theta = thinned.theta_for(record, theta);
+        let at = scalars.iter().map(|(_, at)| *at).collect();
+        let walk = Walk { study: &thinned, candidate, record, theta, scalars: at };
         let estimates = walk.estimate(fleet, &INTENSITIES, runs)?.into_iter().flatten();
         let best = estimates.max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood));
-        found.extend(best.map(|best| input(&thinned, candidate, record, best)));
+        found.extend(best.map(|best| input(&thinned, (candidate, record), &scalars, best)));
     }
     found.sort_by(|a: &UnknownInput, b| b.log_likelihood_gain.total_cmp(&a.log_likelihood_gain));
     Ok(found)
 }
 
-fn input(study: &Study, candidate: &Candidate, record: usize, best: Estimate) -> UnknownInput {
+fn input(
+    study: &Study,
+    (candidate, record): (&Candidate, usize),
+    scalars: &[(&str, usize)],
+    best: Estimate,
+) -> UnknownInput {
     let per = if study.time_unit.is_empty() { "time" } else { study.time_unit.as_str() };
     let state = if candidate.unit.is_empty() { "1" } else { candidate.unit.as_str() };
+    let of_scalars = scalars.iter().zip(best.states);
+    let states: Vec<(String, Vec<f64>)> =
+        of_scalars.map(|((n, _), course)| ((*n).to_owned(), course)).collect();
+    let own = states.iter().find(|(name, _)| *name == candidate.state);
     UnknownInput {
         state: candidate.state.clone(),
         unit: if state.contains('/') { format!("({state})/{per}") } else { format!("{state}/{per}") },
@@ -72,7 +89,8 @@ fn input(study: &Study, candidate: &Candidate, record: usize, best: Estimate) ->
         time: best.time,
         value: best.value,
         sd: best.sd,
-        at: best.at,
+        at: own.map_or_else(Vec::new, |(_, course)| course.clone()),
+        states,
         log_likelihood_gain: best.log_likelihood - best.without,
         proposed: Vec::new(),
     }

@@ -44,9 +44,7 @@ pub(crate) fn search_further<'c>(
     }
     searcher.widen(found, screening)?;
     searcher.refit_singles(found, &best)?;
-    if kind == Kind::Generic {
-        searcher.refit_near_priors(found)?;
-    }
+    searcher.refit_near_priors(found)?;
     searcher.second_pass(found, &Options { max_effects: 1, ..options.clone() })?;
     found.cut_short |= searcher.cut_short || searcher.cache.was_cut_short();
     Ok(true)

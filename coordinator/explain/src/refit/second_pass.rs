@@ -11,8 +11,10 @@ use crate::fit::candidate::Candidate;
 use crate::fit::fitted_variant::FittedVariant;
 use crate::fit::model_variant::{AddedEffect, ModelVariant};
 use crate::judge::contribution::check_contributions;
+use crate::judge::effective_noise::inflation;
 use crate::judge::form::{Leftover, Measured, leftover};
 use crate::judge::gates::JudgedFit;
+use crate::judge::objections::SHARE;
 use crate::judge::search_result::SearchResult;
 use crate::options::Options;
 use crate::run_cache::Course;
@@ -35,12 +37,12 @@ impl<'c> Searcher<'_, '_, 'c> {
             let screening = self.rescreen(found, 0, course)?;
             let best = &found.judged[0];
             let name = best.fit.variant.name();
-            let seconds: Vec<ScreeningResult> = self
-                .best_of_each(&screening)
-                .into_iter()
-                .filter(|h| h.score.gain / best.inflation > found.null_distribution.threshold)
-                .take(2)
-                .collect();
+            let mut seconds = Vec::new();
+            for second in self.best_of_each(&screening).into_iter().take(2) {
+                if self.is_promising(best, &second, found.null_distribution.threshold)? {
+                    seconds.push(second);
+                }
+            }
             if seconds.is_empty() {
                 break;
             }
@@ -59,6 +61,27 @@ impl<'c> Searcher<'_, '_, 'c> {
             self.rescreen(found, chosen, Course::Last)?;
         }
         Ok(())
+    }
+
+    /// Whether a further effect gains more than chance: in units of the noise that its partner leaves, or, where it takes most of what that
+    /// leaves, of the noise that both leave.
+    fn is_promising(
+        &self,
+        partner: &JudgedFit<'c>,
+        second: &ScreeningResult,
+        threshold: f64,
+    ) -> Result<bool, ExplainError> {
+        let gain = second.score.gain;
+        if gain > partner.inflation * threshold {
+            return Ok(true);
+        }
+        let (optimum, n) = (partner.fit.optimum()?, self.cache.rows.train.len());
+        if gain < SHARE * (partner.fit.residual().norm_squared() - n as f64) {
+            return Ok(false);
+        }
+        let own = optimum.unimitated(&second.influence.of_train(self.cache)?);
+        let left = optimum.residual() - own * second.score.amplitude;
+        Ok(gain > inflation(&self.cache.rows, &left.rows(0, n).into_owned()) * threshold)
     }
 
     /// Scores the candidates at the refitted variant at a position, and notes the fall of χ² that they and modulated forms of its

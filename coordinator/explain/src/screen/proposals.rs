@@ -60,9 +60,11 @@ pub(crate) fn proposals(
     inputs: &[UnknownInput],
     known: &[Candidate],
 ) -> Proposals {
-    let run = ReferenceRun { study, theta, tracks };
     let mut all = Proposals::default();
     for input in inputs {
+        // Along the model as it is, far from the data, a term is not what it is where they were measured.
+        let near_data = near_data(study, tracks, input);
+        let run = ReferenceRun { study, theta, tracks: &near_data };
         let Some(recovered) = Recovered::new(&run, input) else { continue };
         let is_new = |def: &EffectDef| !known.iter().any(|other| same_form(&other.def, def));
         let of_equation: Vec<Candidate> = grammar(study, &input.state, tracks)
@@ -145,6 +147,34 @@ fn course(
         sum.iter_mut().zip(term).for_each(|(sum, v)| *sum += v);
     }
     Some(sum)
+}
+
+/// The courses with the states as an unknown input and the data have them, between whose times they go straight.
+fn near_data(study: &Study, tracks: &[Track], input: &UnknownInput) -> Vec<Track> {
+    let mut tracks = tracks.to_vec();
+    let Some(record) = study.records.iter().position(|r| r.name == input.record) else { return tracks };
+    for (name, course) in &input.states {
+        let Some(track) = tracks.iter_mut().find(|track| track.name == *name) else { continue };
+        let Some(values) = track.values.get_mut(record) else { continue };
+        for (value, t) in values.iter_mut().zip(&study.records[record].times) {
+            *value = between(&input.time, course, *t);
+        }
+    }
+    tracks
+}
+
+/// The value of a course at a time, straight between its times and constant beyond them.
+fn between(times: &[f64], course: &[f64], t: f64) -> f64 {
+    let (Some(first), Some(last)) = (course.first(), course.last()) else { return f64::NAN };
+    let after = times.partition_point(|known| *known <= t);
+    if after == 0 {
+        return *first;
+    }
+    if after >= times.len() {
+        return *last;
+    }
+    let share = (t - times[after - 1]) / (times[after] - times[after - 1]);
+    course[after - 1] + share * (course[after] - course[after - 1])
 }
 
 /// The position of each of these times among those of a record, the last before it.

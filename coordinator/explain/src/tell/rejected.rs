@@ -6,7 +6,7 @@ use starlings_models::units::spaced;
 
 use super::result::Rejected;
 use crate::fit::candidate::Candidate;
-use crate::judge::contribution::{carries_its_share, shares};
+use crate::judge::contribution::lacking_shares;
 use crate::judge::gates::JudgedFit;
 use crate::judge::search_result::SearchResult;
 use crate::judge::verdict::Decision;
@@ -79,17 +79,16 @@ fn behind(found: &SearchResult<'_>, decision: &Decision, i: usize) -> String {
     let Some(best) = decision.best.map(|b| &found.judged[b]) else { return String::new() };
     let judged = &found.judged[i];
     let name = best.fit.variant.name();
-    if judged.fit.variant.effects.len() > best.fit.variant.effects.len() {
-        let (train, held_out) = shares(found, &judged.misfit, &best.misfit);
-        if !carries_its_share(train, held_out) {
-            return format!(
-                "beyond `{name}` it takes away {:.1} % of the gap on the training data{}: a further effect must carry a tenth of {}",
-                100.0 * train,
-                held_out
-                    .map_or_else(String::new, |h| format!(" and {:.1} % on the held-out span", 100.0 * h)),
-                if held_out.is_some() { "what was held out, and of both on average" } else { "it" }
-            );
-        }
+    if judged.fit.variant.effects.len() > best.fit.variant.effects.len()
+        && let Some((train, held_out)) = lacking_shares(found, judged, best)
+    {
+        return format!(
+            "beyond `{name}` it takes away {:.1} % of the gap on the training data{}: a further effect must carry a tenth of {}, or \
+             leave nothing but noise of a discrepancy",
+            100.0 * train,
+            held_out.map_or_else(String::new, |h| format!(" and {:.1} % on the held-out span", 100.0 * h)),
+            if held_out.is_some() { "what was held out, and of both on average" } else { "it" }
+        );
     }
     format!(
         "with it χ² of all data together, less the price of its further parameters, falls by {:.1}, with `{name}` by {:.1}, in \

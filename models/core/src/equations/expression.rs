@@ -59,6 +59,28 @@ impl Expression {
         linear::split(&self.node, &[name.to_owned()]).is_ok()
     }
 
+    /// Whether the names that `moves` chooses enter as powers in a product only: in no sum, no function and no condition.
+    pub fn is_product_in(&self, moves: &dyn Fn(&str) -> bool) -> bool {
+        fn is_product(part: &Node, moves: &dyn Fn(&str) -> bool) -> bool {
+            match part {
+                Node::Number(_) | Node::Time | Node::Name(_) => true,
+                Node::Call(Function::Neg, a) => is_product(a, moves),
+                Node::Pair(Operation::Mul | Operation::Div, a, b) => {
+                    is_product(a, moves) && is_product(b, moves)
+                }
+                Node::Pair(Operation::Pow, a, power) if matches!(**power, Node::Number(_)) => {
+                    is_product(a, moves)
+                }
+                _ => {
+                    let mut found = false;
+                    part.walk(&mut |n| found |= n.name().is_some_and(|name| moves(&name.text)));
+                    !found
+                }
+            }
+        }
+        is_product(&self.node, moves)
+    }
+
     /// Makes flat code out of the expression.
     ///
     /// `resolve` says where a name's value is, `nearest` offers a valid name for an unknown one. `ddt` of a name that is not

@@ -20,8 +20,6 @@ pub(super) struct Candidate {
     pub(super) state: String,
     /// Its unit label.
     pub(super) unit: String,
-    /// Its position in the state vector.
-    pub(super) at: usize,
     /// The model with the input, as the fleet knows it; the input is the last parameter.
     pub(super) setup: SetupId,
     /// The constant input that moves the outputs about as far as the residuals are.
@@ -35,7 +33,6 @@ pub(super) struct Candidate {
 /// An equation and the runs of the record with it.
 struct Trial<'a> {
     quantity: &'a Quantity,
-    at: usize,
     setup: SetupId,
     without: Prediction,
     /// A constant input so small that the response of a nonlinear model is linear in it.
@@ -75,16 +72,16 @@ pub(super) fn candidates(
     let trial = |((quantity, at, setup), without): ((_, usize, SetupId), Option<Prediction>)| {
         let without = without?;
         let size = without.state.get(at).map_or(0.0, |x| x.abs()).max(1e-3);
-        Some(Trial { quantity, at, setup, without, input: 1e-3 * size / span.max(f64::MIN_POSITIVE) })
+        Some(Trial { quantity, setup, without, input: 1e-3 * size / span.max(f64::MIN_POSITIVE) })
     };
     let trials: Vec<Trial<'_>> = equations.into_iter().zip(at_rest).filter_map(trial).collect();
     let moved = fly(fleet, trials.iter().map(|t| (t.setup, t.input)).collect())?;
     let candidate = |(trial, with): (Trial<'_>, Option<Prediction>)| {
-        let Trial { quantity, at, setup, without, input } = trial;
+        let Trial { quantity, setup, without, input } = trial;
         let (moved, missed) = sizes(study, record, &window, &without, &with?);
         let (state, unit) = (quantity.name.clone(), quantity.unit.clone());
         let (scale, without) = (input * missed.max(1.0) / moved, without.outputs);
-        (moved / 1e-3 > FELT).then_some(Candidate { state, unit, at, setup, scale, without, felt: moved })
+        (moved / 1e-3 > FELT).then_some(Candidate { state, unit, setup, scale, without, felt: moved })
     };
     let mut found: Vec<Candidate> = trials.into_iter().zip(moved).filter_map(candidate).collect();
     found.sort_by(|a, b| b.felt.total_cmp(&a.felt));

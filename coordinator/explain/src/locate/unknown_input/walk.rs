@@ -29,6 +29,8 @@ pub(super) struct Walk<'a> {
     pub(super) record: usize,
     /// A job's parameters without the input.
     pub(super) theta: Vec<f64>,
+    /// Positions of the scalar states in the state vector.
+    pub(super) scalars: Vec<usize>,
 }
 
 /// What one intensity of the walk gives.
@@ -36,7 +38,8 @@ pub(super) struct Estimate {
     pub(super) time: Vec<f64>,
     pub(super) value: Vec<f64>,
     pub(super) sd: Vec<f64>,
-    pub(super) at: Vec<f64>,
+    /// Courses of the scalar states, in the order of [`Walk::scalars`].
+    pub(super) states: Vec<Vec<f64>>,
     pub(super) log_likelihood: f64,
     /// Log-likelihood of the model without the input.
     pub(super) without: f64,
@@ -56,8 +59,8 @@ struct Forward {
 /// What the smoother needs of one window.
 struct Past {
     time: f64,
-    /// Rows of the state and of the input at the window's end, before the analysis.
-    mean: [f64; 2],
+    /// Rows of the scalar states and, last, of the input at the window's end, before the analysis.
+    mean: Vec<f64>,
     factor: DMatrix<f64>,
     /// Analysis of the coordinates.
     mu: DVector<f64>,
@@ -199,10 +202,10 @@ impl Walk<'_> {
         joint[(n, k)] = walk.step;
         let rotation = leading(&joint, &walk.size, k)?;
         walk.factor = joint * &rotation;
-        let at = self.candidate.at;
-        let rows = DMatrix::from_fn(2, k, |i, j| factor[(if i == 0 { at } else { n }, j)]);
+        let kept: Vec<usize> = self.scalars.iter().copied().chain([n]).collect();
         let time = window.times.last().copied().unwrap_or(window.start);
-        walk.past.push(Past { time, mean: [mean[at], mean[n]], factor: rows, mu, c, rotation });
+        let (mean, factor) = (kept.iter().map(|i| mean[*i]).collect(), factor.select_rows(&kept));
+        walk.past.push(Past { time, mean, factor, mu, c, rotation });
         Some(walk)
     }
 
@@ -223,7 +226,8 @@ impl Forward {
     /// Back from the last window to the first: estimates given all data.
     fn smooth(self, without: f64) -> Estimate {
         let n = self.past.len();
-        let (mut value, mut sd, mut at) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+        let n_scalar = self.past.first().map_or(0, |past| past.mean.len() - 1);
+        let (mut value, mut sd, mut states) = (vec![0.0; n], vec![0.0; n], vec![vec![0.0; n]; n_scalar]);
         let mut later: Option<(DVector<f64>, DMatrix<f64>)> = None;
         for (index, past) in self.past.iter().enumerate().rev() {
             let k = past.mu.len();
@@ -240,13 +244,15 @@ impl Forward {
             };
             let z = &past.factor * &mean;
             let p = &past.factor * &covariance * past.factor.transpose();
-            at[index] = past.mean[0] + z[0];
-            value[index] = past.mean[1] + z[1];
-            sd[index] = p[(1, 1)].max(0.0).sqrt();
+            for (i, course) in states.iter_mut().enumerate() {
+                course[index] = past.mean[i] + z[i];
+            }
+            value[index] = past.mean[n_scalar] + z[n_scalar];
+            sd[index] = p[(n_scalar, n_scalar)].max(0.0).sqrt();
             later = Some((mean, covariance));
         }
         let time = self.past.iter().map(|p| p.time).collect();
-        Estimate { time, value, sd, at, log_likelihood: self.log_likelihood, without }
+        Estimate { time, value, sd, states, log_likelihood: self.log_likelihood, without }
     }
 }
 

@@ -1,8 +1,11 @@
-//! The grammar of terms that an equation may lack: powers, inverses, products, directions, limits and trends of the states and inputs.
+//! The grammar of terms that an equation may lack: powers, inverses, products, quotients, directions, limits and trends of the states and
+//! inputs, and what the model's own rates become where they enter another equation or change with a quantity ([`own_rates`]).
 //!
 //! Dimensions are carried by the coefficient, so that a term is possible wherever nothing but numbers enters a function; what needs a
 //! scale takes it from the course of its quantity. A factor of constant sign has no direction and no size of its own. Next file to
-//! read: [`super`].
+//! read: [`own_rates`].
+
+mod own_rates;
 
 use starlings_models::effect::library::{MOST_SIGN_WIDTH, SIGN_WIDTH};
 use starlings_models::effect::{Addition, EffectParameter};
@@ -75,6 +78,10 @@ pub(super) fn grammar(study: &Study, state: &str, tracks: &[Track]) -> Vec<Effec
             equation.of_two(q, p);
         }
     }
+    let rates = study.setup.model.equations.iter().flat_map(|of| own_rates::own_rates(of, &signals));
+    for rate in rates {
+        equation.of_rate(&rate, &signals);
+    }
     equation.made
 }
 
@@ -109,6 +116,10 @@ impl Equation<'_> {
             let inverse = format!("goes with one over {x}");
             self.add("inverse", &[(q, -1.0)], 0.0, &inverse, |k| {
                 format!("{k}*{x}/({x}^2 + {:?})", width * width)
+            });
+            let square = format!("goes with one over the square of {x}");
+            self.add("inverse-square", &[(q, -2.0)], 0.0, &square, |k| {
+                format!("{k}/({x}^2 + {:?})", width * width)
             });
         }
         if q.changes_sign() {
@@ -156,6 +167,17 @@ impl Equation<'_> {
             if q.changes_sign() {
                 let says = format!("goes with the size of {x} times {y}");
                 self.add("size-times", &[(q, 1.0), (p, 1.0)], 0.0, &says, |k| format!("{k}*abs({x})*{y}"));
+            }
+            if p.keeps_from_zero() {
+                let zero = format!("{:?}", (WIDTH * p.swing()).powi(2));
+                let says = format!("goes with {x} over {y}");
+                self.add("over", &[(q, 1.0), (p, -1.0)], 0.0, &says, |k| {
+                    format!("{k}*{x}*{y}/({y}^2 + {zero})")
+                });
+                let says = format!("goes with {x} over the square of {y}");
+                self.add("over-square", &[(q, 1.0), (p, -2.0)], 0.0, &says, |k| {
+                    format!("{k}*{x}/({y}^2 + {zero})")
+                });
             }
         }
     }

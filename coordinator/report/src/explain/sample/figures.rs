@@ -113,6 +113,7 @@ fn force(time: &[f64]) -> UnknownInput {
         value: time.iter().map(|t| 3.0 * (1.3 * t).cos().signum() + 0.2 * noise(*t)).collect(),
         sd: vec![0.7; time.len()],
         at: time.iter().map(|t| 90.0 + 12.0 * (1.3 * t).sin()).collect(),
+        states: Vec::new(),
         log_likelihood_gain: 310.0,
         proposed: time.iter().map(|t| 3.0 * (1.3 * t).cos().signum()).collect(),
     }
