@@ -16,7 +16,7 @@ use crate::fit::candidate::Candidate;
 use crate::fit::fitted_variant::FittedVariant;
 use crate::fit::prediction_sd::prediction_sd;
 use crate::judge::effective_noise::inflation;
-use crate::judge::gates::JudgedFit;
+use crate::judge::gates::{JudgedFit, Refusal};
 use crate::judge::probability::probabilities;
 use crate::judge::search_result::SearchResult;
 use crate::judge::verdict::{Decision, Verdict};
@@ -152,9 +152,7 @@ fn to_separate<'f, 'c>(
     match decision.verdict {
         Verdict::Tie => Some([decision.best?, *decision.rivals.first()?].map(|i| &found.judged[i].fit)),
         Verdict::Unexplained => {
-            let is_possible = |j: &&JudgedFit<'_>| {
-                j.refusal.as_ref().is_none_or(|r| !matches!(r.gate, "failed" | "sign" | "range"))
-            };
+            let is_possible = |j: &&JudgedFit<'_>| !j.refusal.as_ref().is_some_and(Refusal::is_impossible);
             let best = decision.best.map(|i| &found.judged[i]);
             let others = found.judged.iter().filter(is_possible);
             let others = others.filter(|j| best.is_none_or(|b| b.names() != j.names()));

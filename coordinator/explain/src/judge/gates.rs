@@ -32,6 +32,13 @@ pub(crate) struct Refusal {
     pub reason: String,
 }
 
+impl Refusal {
+    /// Whether the fit is none that physics allows: it failed, or a coefficient has the wrong sign or ends at the end of its range.
+    pub(crate) fn is_impossible(&self) -> bool {
+        matches!(self.gate, "failed" | "sign" | "range")
+    }
+}
+
 /// A refitted variant with the figures for and against it.
 #[derive(Clone, Debug)]
 pub(crate) struct JudgedFit<'c> {

@@ -8,6 +8,7 @@
 use starlings_estimators::{CorrelatedNoise, FittedNoise, Part, Series, fit_noise};
 
 use super::adequacy::Adequacy;
+use super::gates::Refusal;
 use super::search_result::SearchResult;
 use crate::fit::fitted_variant::FittedVariant;
 use crate::rows::{Rows, Usage};
@@ -64,8 +65,7 @@ pub(super) fn most_supported<'f, 'c, N>(
     };
     // Half the χ² of the prior.
     let prior = |fit: &FittedVariant<'_>| 0.5 * (fit.cost() - fit.residual().norm_squared());
-    let is_possible = |gate: &str| !matches!(gate, "failed" | "sign" | "range");
-    let possible = found.judged.iter().filter(|j| j.refusal.as_ref().is_none_or(|r| is_possible(r.gate)));
+    let possible = found.judged.iter().filter(|j| !j.refusal.as_ref().is_some_and(Refusal::is_impossible));
     let versions = std::iter::once(&found.base).chain(possible.take(MOST).map(|judged| &judged.fit));
     let supported = versions.filter_map(|fit| {
         let (log_density, noise) = of(fit)?;

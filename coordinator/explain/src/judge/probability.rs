@@ -156,8 +156,7 @@ fn still_listed(listed: f64, left: &Adequacy, discrepancy: f64) -> f64 {
 
 /// Whether a variant has a say: it passes the gates, or, where nothing explains the gap, is at least possible.
 fn counts(judged: &JudgedFit<'_>, is_answered: bool) -> bool {
-    let is_possible = |gate: &str| !is_answered && !matches!(gate, "failed" | "sign" | "range");
-    judged.refusal.as_ref().is_none_or(|r| is_possible(r.gate))
+    judged.refusal.as_ref().is_none_or(|refusal| !is_answered && !refusal.is_impossible())
 }
 
 /// By how much a set that adds something small to one of a class does better than the class. It speaks against none of that, since the same may stand
