@@ -22,17 +22,18 @@ pub(super) fn at_edge(fit: &FittedVariant<'_>) -> Option<Refusal> {
             let j = variant.first_entry_of(m) + k;
             let value = variant.study.theta[j].transform.to_physical(theta[j]);
             let Some(end) = end_at(effect, k, value) else { continue };
-            let gate = if k == 0 && (end.abs() < f64::MIN_POSITIVE) { "sign" } else { "range" };
-            let unit = spaced(&parameter.unit);
-            return Some(Refusal {
-                gate,
-                reason: format!(
-                    "the best value of {} lies at the end of what physics allows ({}{unit}): the shape fits, the physics does \
-                     not",
-                    parameter.name,
-                    three(end)
-                ),
-            });
+            let is_sign = k == 0 && end.abs() < f64::MIN_POSITIVE;
+            let (gate, of, what) = if is_sign {
+                ("sign", "what physics allows", "physics")
+            } else {
+                ("range", "its range", "value")
+            };
+            let (name, unit) = (&parameter.name, spaced(&parameter.unit));
+            let reason = format!(
+                "the best value of {name} lies at the end of {of} ({}{unit}): the shape fits, the {what} does not",
+                three(end)
+            );
+            return Some(Refusal { gate, reason });
         }
     }
     None
