@@ -15,8 +15,6 @@ use crate::fit::kind::Kind;
 use crate::fit::model_variant::{AddedEffect, ModelVariant};
 use crate::judge::contribution::SECOND_SHARE;
 use crate::judge::effective_noise::inflation;
-use crate::judge::null_distribution::LEAST;
-use crate::judge::objections::SHARE;
 use crate::judge::search_result::SearchResult;
 use crate::judge::verdict::ALIKE;
 use crate::run_cache::Course;
@@ -64,7 +62,7 @@ impl<'c> Searcher<'_, '_, 'c> {
         let optimum = found.base.optimum()?;
         let threshold = found.null_distribution.threshold;
         let mut fits: Vec<FittedVariant<'c>> = Vec::new();
-        for pair in best_pairs(&members, optimum.residual(), self.cache.rows.train.len()) {
+        for pair in best_pairs(&members, optimum.residual()) {
             // The noise is that of the residuals without the pair.
             let [a, b] = pair.members.map(|m| &members[m]);
             let taken = &a.own * pair.amplitudes[0] + &b.own * pair.amplitudes[1];
@@ -175,9 +173,8 @@ impl<'c> Searcher<'_, '_, 'c> {
 }
 
 /// The pairs with the largest gain, each of whose members adds its share, one for every two candidates.
-fn best_pairs(members: &[Member], residual: &DVector<f64>, n_rows: usize) -> Vec<PairScore> {
+fn best_pairs(members: &[Member], residual: &DVector<f64>) -> Vec<PairScore> {
     let k = members.len();
-    let excess = residual.norm_squared() - n_rows as f64;
     let along = DVector::from_iterator(k, members.iter().map(|m| m.own.dot(residual)));
     let products =
         DMatrix::from_fn(k, k, |i, j| if i <= j { members[i].own.dot(&members[j].own) } else { 0.0 });
@@ -189,7 +186,6 @@ fn best_pairs(members: &[Member], residual: &DVector<f64>, n_rows: usize) -> Vec
                 along: [along[i], along[j]],
                 squares: [products[(i, i)], products[(j, j)]],
                 both: products[(i, j)],
-                excess,
             };
             if a.result.candidate != b.result.candidate
                 && let Some((amplitudes, gain)) = of.best([a.sign, b.sign])
@@ -215,8 +211,6 @@ struct Normal {
     along: [f64; 2],
     squares: [f64; 2],
     both: f64,
-    /// χ² of what they are to explain, above the noise.
-    excess: f64,
 }
 
 impl Normal {
@@ -247,10 +241,8 @@ impl Normal {
         };
         let gain = self.gain(amplitudes);
         let allowed = (0..2).all(|k| amplitudes[k] * signs[k] >= 0.0);
-        let better = alone(0).max(alone(1));
-        // A tenth of the whole, or most of what its partner leaves.
-        let share = (SECOND_SHARE * gain).min((SHARE * (self.excess - better)).max(LEAST));
-        (allowed && gain.is_finite() && gain - better > share).then_some((amplitudes, gain))
+        (allowed && gain.is_finite() && gain - alone(0).max(alone(1)) > SECOND_SHARE * gain)
+            .then_some((amplitudes, gain))
     }
 }
 
@@ -260,8 +252,7 @@ mod tests {
 
     /// Two influences of length one with this product, and a residual made of amplitudes of both.
     fn normal(both: f64, [a, b]: [f64; 2]) -> Normal {
-        let excess = a * a + b * b + 2.0 * both * a * b;
-        Normal { along: [a + both * b, b + both * a], squares: [1.0, 1.0], both, excess }
+        Normal { along: [a + both * b, b + both * a], squares: [1.0, 1.0], both }
     }
 
     #[test]

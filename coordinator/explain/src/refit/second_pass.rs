@@ -10,7 +10,7 @@ use crate::error::ExplainError;
 use crate::fit::candidate::Candidate;
 use crate::fit::fitted_variant::FittedVariant;
 use crate::fit::model_variant::{AddedEffect, ModelVariant};
-use crate::judge::contribution::check_contributions;
+use crate::judge::contribution::{DISCREPANT, check_contributions};
 use crate::judge::effective_noise::inflation;
 use crate::judge::form::{Leftover, Measured, leftover};
 use crate::judge::gates::JudgedFit;
@@ -63,22 +63,23 @@ impl<'c> Searcher<'_, '_, 'c> {
         Ok(())
     }
 
-    /// Whether a further effect gains more than chance: in units of the noise that its partner leaves, or, where it takes most of what that
-    /// leaves, of the noise that both leave.
+    /// Whether a further effect gains more than chance: in units of the noise that its partner leaves, or, where that is a discrepancy of its
+    /// own, most of which it takes, of the noise that both leave.
     fn is_promising(
         &self,
         partner: &JudgedFit<'c>,
         second: &ScreeningResult,
         threshold: f64,
     ) -> Result<bool, ExplainError> {
-        let gain = second.score.gain;
+        let (gain, n) = (second.score.gain, self.cache.rows.train.len());
         if gain > partner.inflation * threshold {
             return Ok(true);
         }
-        let (optimum, n) = (partner.fit.optimum()?, self.cache.rows.train.len());
-        if gain < SHARE * (partner.fit.residual().norm_squared() - n as f64) {
+        let excess = partner.fit.residual().norm_squared() - n as f64;
+        if partner.inflation <= DISCREPANT || gain < SHARE * excess {
             return Ok(false);
         }
+        let optimum = partner.fit.optimum()?;
         let own = optimum.unimitated(&second.influence.of_train(self.cache)?);
         let left = optimum.residual() - own * second.score.amplitude;
         Ok(gain > inflation(&self.cache.rows, &left.rows(0, n).into_owned()) * threshold)

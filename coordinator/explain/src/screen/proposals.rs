@@ -27,7 +27,7 @@ use crate::options::Options;
 /// Terms of one equation that become candidates.
 const MOST: usize = 60;
 /// Terms that are tried in place of one that was named, in each of its equations.
-const NEAREST: usize = 24;
+const NEAREST: usize = 36;
 
 /// Terms made from unknown inputs.
 #[derive(Debug, Default)]
