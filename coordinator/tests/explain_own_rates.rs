@@ -6,7 +6,7 @@ mod study_kit;
 
 use explained_kit::{explained, noisy};
 use starlings_coordinator::explain::{Explanation, Kind, Verdict};
-use study_kit::{Case, csv, grid};
+use study_kit::{Case, csv, grid, normals};
 
 /// A plate in the sun that loses heat to the air.
 const PLATE: &str = r#"
@@ -115,7 +115,7 @@ fn steps(times: &[f64], [low, high]: [f64; 2], period: f64) -> Vec<f64> {
     times.iter().map(|t| if turn(*t) > 0.0 { high } else { low }).collect()
 }
 
-/// Checks that a proposal is named alone, with this coefficient, and returns what was found.
+/// Checks that a proposal is named alone, with this coefficient.
 fn proposes(found: &Explanation, name: &str, truth: f64, unit: &str) {
     let said = &found.headline;
     assert_eq!(found.verdict, Verdict::Named, "{said}");
@@ -152,7 +152,10 @@ fn a_rate_that_acts_in_another_equation_too_is_proposed_there() {
     let truth = Case::new(&format!("{TANK}{HEAT}"), &[("run.csv", recording(&blank, &blank))]);
     let values = [("q", 0.105), ("k", 0.18), ("ua", 0.32)];
     let of = |column, sd| noisy(&truth, &values, ("heat", 60.0), column, sd);
-    let recorded = recording(&of("assay", 0.01), &of("probe", 0.3));
+    // Each channel has a noise of its own.
+    let probe: Vec<f64> =
+        of("probe", 0.0).iter().zip(normals(times.len(), 6)).map(|(v, e)| v + 0.3 * e).collect();
+    let recorded = recording(&of("assay", 0.01), &probe);
     let found = explained(&Case::new(TANK, &[("run.csv", recorded)])).unwrap();
     // What it uses up of c it gives to T.
     proposes(&found, "rate-of:T:c:reaction", -60.0, "K L/mol");

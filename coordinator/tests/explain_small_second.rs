@@ -6,7 +6,7 @@ mod study_kit;
 
 use explained_kit::{explained, noisy};
 use starlings_coordinator::explain::{Explanation, Verdict};
-use study_kit::{Case, csv, grid};
+use study_kit::{Case, csv, grid, normals};
 
 /// A mass on a spring that is shaken, seen by a potentiometer and a velocimeter.
 const RIG: &str = r#"
@@ -79,7 +79,10 @@ fn found_with(drift: f64) -> Explanation {
     let truth = Case::new(&format!("{RIG}{STOP}"), &[("rig.csv", recording(&blank, &blank))]);
     let of = |column, sd| noisy(&truth, &[], ("stop", 400.0), column, sd);
     let pot: Vec<f64> = of("pot", 0.0008).iter().zip(&times).map(|(x, t)| x + drift * t).collect();
-    explained(&Case::new(RIG, &[("rig.csv", recording(&pot, &of("vel", 0.01)))])).unwrap()
+    // Each channel has a noise of its own.
+    let vel: Vec<f64> =
+        of("vel", 0.0).iter().zip(normals(times.len(), 6)).map(|(v, e)| v + 0.01 * e).collect();
+    explained(&Case::new(RIG, &[("rig.csv", recording(&pot, &vel))])).unwrap()
 }
 
 #[test]

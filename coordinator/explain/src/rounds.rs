@@ -67,12 +67,9 @@ impl Rounds {
     /// Whether a decision stands: something is told, and if that was in units of a noise larger than was found, it is of a version whose residuals may
     /// be such a noise.
     pub(crate) fn stands(&self, found: &SearchResult<'_>, decision: &Decision) -> bool {
-        let best =
-            decision.best.filter(|_| decision.verdict != Verdict::NoGap).map(|best| &found.judged[best]);
-        let told = best.map_or(&found.base, |judged| &judged.fit);
-        let is_noise = best.is_none_or(|judged| judged.adequacy.could_be_white());
-        let is_believed =
-            self.smaller.as_ref().is_none_or(|of| is_noise && leaves_little(&of.rows, found, told));
+        let told = decision.best.map_or(&found.base, |best| &found.judged[best].fit);
+        let told = if decision.verdict == Verdict::NoGap { &found.base } else { told };
+        let is_believed = self.smaller.as_ref().is_none_or(|of| leaves_little(&of.rows, found, told));
         decision.verdict != Verdict::Unexplained && is_believed
     }
 

@@ -144,7 +144,7 @@ fn with_terms(
 }
 
 /// The versions that an experiment should separate: the tied, or the two that come nearest where nothing is named, of which the model as
-/// it is may be one. A version at the end of what physics allows is none.
+/// it is may be one. A version with a coefficient at the end of its range is none.
 fn to_separate<'f, 'c>(
     found: &'f SearchResult<'c>,
     decision: &Decision,

@@ -9,6 +9,10 @@ use starlings_models::{Drive, EffectDef};
 const POINTS: usize = 16;
 /// Relative difference of two values that rounding makes.
 const ROUNDING: f64 = 1e-9;
+/// Values of every second point over those of the others: an exponential of a temperature has a value at one of the two.
+const LARGE: f64 = 300.0;
+/// Points at least at which both terms must have a value to be told equal.
+const TOLD: usize = 3;
 
 /// Whether two effects add the same functions to the same quantities, whatever their parameters and states are called and up to a
 /// factor on the amplitude, which is the same for all of their terms.
@@ -27,23 +31,35 @@ pub(crate) fn same_form(a: &EffectDef, b: &EffectDef) -> bool {
     let adds = |terms: &Terms| of(&terms.adds.iter().map(|(_, term)| term).collect::<Vec<_>>());
     let states = |terms: &Terms| of(&terms.states.iter().collect::<Vec<_>>());
     let (left, right) = (adds(&a), adds(&b));
-    let first = left.iter().zip(&right).find(|(l, r)| l.abs() > 0.0 && r.abs() > 0.0);
-    let Some(factor) = first.map(|(l, r)| r / l) else { return false };
+    let has_value = |v: f64| v.abs() > 0.0 && v.is_finite();
+    let both: Vec<f64> = left
+        .iter()
+        .zip(&right)
+        .filter(|(l, r)| has_value(**l) && has_value(**r))
+        .map(|(l, r)| r / l)
+        .collect();
+    let Some(factor) = both.first().copied().filter(|_| both.len() >= TOLD) else { return false };
     equal(&left, &right, factor) && equal(&states(&a), &states(&b), 1.0)
 }
 
 /// Whether the second values are the first times a factor.
 fn equal(a: &[f64], b: &[f64], factor: f64) -> bool {
-    let size = b.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
-    // A root of a negative number is one of both.
-    a.iter().zip(b).all(|(a, b)| (a * factor - b).abs() <= ROUNDING * size || (a.is_nan() && b.is_nan()))
+    // A root of a negative number, and what overflows, is one of both.
+    let is_equal = |a: f64, b: f64| {
+        if a.is_finite() && b.is_finite() {
+            (a - b).abs() <= ROUNDING * a.abs().max(b.abs())
+        } else {
+            !a.is_finite() && !b.is_finite()
+        }
+    };
+    a.iter().zip(b).all(|(a, b)| is_equal(a * factor, *b))
 }
 
-/// Numbers of both signs between 0.3 and 1.9, without a pattern (the golden ratio's multiples).
+/// Numbers of both signs between 0.3 and 1.9, [`LARGE`] times that at every second point, without a pattern (the golden ratio's multiples).
 fn point(k: usize, n: usize) -> Vec<f64> {
     let number = |j: usize| {
         let turn = (0.618_033_988_75 * (1 + j + k * (n + 1)) as f64).fract();
-        let size = 0.3 + 1.6 * turn;
+        let size = (0.3 + 1.6 * turn) * if k % 2 == 1 { LARGE } else { 1.0 };
         if (j + k) % 3 == 2 { -size } else { size }
     };
     // The amplitude is one.
@@ -121,6 +137,13 @@ mod tests {
         assert!(!same_form(&drag, &effect("v", "-c*v", &["c"], &[])), "another term");
         assert!(!same_form(&drag, &effect("x", "-c*v*abs(v)", &["c"], &[])), "another place");
         assert!(!same_form(&drag, &effect("v", "-c*x*abs(x)", &["c"], &[])), "another signal");
+        let heat = effect("T", "b*k*exp(-6000*(1/T - 1/330))*c", &["b"], &[]);
+        assert!(
+            same_form(&heat, &effect("T", "-a*(-k*exp(-6000*(1/T - 1/330))*c)", &["a"], &[])),
+            "Arrhenius (1889)"
+        );
+        assert!(!same_form(&heat, &effect("T", "a", &["a"], &[])), "a constant");
+        assert!(!same_form(&heat, &effect("T", "a*c", &["a"], &[])), "a coupling");
         let late = effect("v", "k*s", &["k", "tau"], &[("s", "(x - s)/tau")]);
         assert!(same_form(&late, &effect("v", "a*z", &["a", "T"], &[("z", "(x - z)/T")])));
         assert!(!same_form(&late, &effect("v", "a*z", &["a", "T"], &[("z", "(v - z)/T")])));

@@ -4,6 +4,7 @@
 //! discrepancy of another kind remains; unless it settles that one, so that nothing but noise is left, however small it is beside what its
 //! partner takes away. Next file to read: [`super::verdict`].
 
+use super::adequacy::AS_STATED;
 use super::gates::JudgedFit;
 use super::misfit::Misfit;
 use super::search_result::SearchResult;
@@ -69,9 +70,12 @@ pub(crate) fn lacking_shares(
     (!carries_its_share(train, held_out) && !settles(whole, part)).then_some((train, held_out))
 }
 
-/// Whether a further effect settles what its partner leaves: a discrepancy of another kind, of which nothing is left but noise, held out or not.
-fn settles(whole: &JudgedFit<'_>, part: &JudgedFit<'_>) -> bool {
-    part.inflation > DISCREPANT && !whole.adequacy.is_gap() && !whole.held_out.iter().any(|h| h.fails)
+/// Whether a further effect settles what its partner leaves: a discrepancy of another kind, of which nothing is left but noise of the stated
+/// size, held out or not. How uncertain a noise is that was found excuses nothing here.
+pub(crate) fn settles(whole: &JudgedFit<'_>, part: &JudgedFit<'_>) -> bool {
+    let of_noise = &whole.adequacy;
+    let is_noise = !of_noise.is_gap() && of_noise.rmse_over_noise.powi(2) <= AS_STATED[1];
+    part.inflation > DISCREPANT && is_noise && !whole.held_out.iter().any(|h| h.fails)
 }
 
 /// The share of a whole's fall of χ² that a part of it lacks: of the training rows, and of the held-out span where there is one.

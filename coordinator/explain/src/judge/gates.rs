@@ -33,7 +33,7 @@ pub(crate) struct Refusal {
 }
 
 impl Refusal {
-    /// Whether the fit is none that physics allows: it failed, or a coefficient has the wrong sign or ends at the end of its range.
+    /// Whether the fit is no version that could be told: it failed, or a coefficient has the wrong sign or ends at the end of its range.
     pub(crate) fn is_impossible(&self) -> bool {
         matches!(self.gate, "failed" | "sign" | "range")
     }

@@ -1,4 +1,4 @@
-//! The gate of ranges: an estimate at the end of what physics allows.
+//! The gate of ranges: an estimate at the end of what physics allows, or of the range in which it is sought.
 //!
 //! Next file to read: [`super::gates`].
 

@@ -10,7 +10,7 @@ use crate::error::ExplainError;
 use crate::fit::candidate::Candidate;
 use crate::fit::fitted_variant::FittedVariant;
 use crate::fit::model_variant::{AddedEffect, ModelVariant};
-use crate::judge::contribution::{DISCREPANT, check_contributions};
+use crate::judge::contribution::{DISCREPANT, check_contributions, settles};
 use crate::judge::effective_noise::inflation;
 use crate::judge::form::{Leftover, Measured, leftover};
 use crate::judge::gates::JudgedFit;
@@ -20,6 +20,16 @@ use crate::options::Options;
 use crate::run_cache::Course;
 use crate::screen::screening::screen;
 use crate::screen::screening_result::ScreeningResult;
+
+/// Further effects that are looked at beside the best variant.
+const MOST: usize = 2;
+
+/// A further effect beside the best variant.
+struct Second {
+    result: ScreeningResult,
+    /// Whether it counts only if it settles what its partner leaves.
+    must_settle: bool,
+}
 
 impl<'c> Searcher<'_, '_, 'c> {
     /// Scores the candidates again at the best variant and refits replacements and pairs, until no better variant comes of it.
@@ -37,18 +47,14 @@ impl<'c> Searcher<'_, '_, 'c> {
             let screening = self.rescreen(found, 0, course)?;
             let best = &found.judged[0];
             let name = best.fit.variant.name();
-            let mut seconds = Vec::new();
-            for second in self.best_of_each(&screening).into_iter().take(2) {
-                if self.is_promising(best, &second, found.null_distribution.threshold)? {
-                    seconds.push(second);
-                }
-            }
+            let seconds = self.seconds(best, &screening, found.null_distribution.threshold)?;
             if seconds.is_empty() {
                 break;
             }
             let fits = self.replacements_and_pairs(found, best, &seconds, options)?;
             let n = fits.len();
             self.judge_all(found, fits)?;
+            drop_unsettled(found, &name, &seconds);
             let same = found.judged.first().is_some_and(|j| j.fit.variant.name() == name);
             if n == 0 || same {
                 break;
@@ -63,26 +69,36 @@ impl<'c> Searcher<'_, '_, 'c> {
         Ok(())
     }
 
-    /// Whether a further effect gains more than chance: in units of the noise that its partner leaves, or, where that is a discrepancy of its
-    /// own, most of which it takes, of the noise that both leave.
-    fn is_promising(
+    /// The two best further effects that gain more than chance: in units of the noise that their partner leaves, or, where that is a
+    /// discrepancy of its own, most of which one takes, of the noise that both leave.
+    fn seconds(
         &self,
         partner: &JudgedFit<'c>,
-        second: &ScreeningResult,
+        screening: &[ScreeningResult],
         threshold: f64,
-    ) -> Result<bool, ExplainError> {
-        let (gain, n) = (second.score.gain, self.cache.rows.train.len());
-        if gain > partner.inflation * threshold {
-            return Ok(true);
-        }
+    ) -> Result<Vec<Second>, ExplainError> {
+        let (optimum, n) = (partner.fit.optimum()?, self.cache.rows.train.len());
         let excess = partner.fit.residual().norm_squared() - n as f64;
-        if partner.inflation <= DISCREPANT || gain < SHARE * excess {
-            return Ok(false);
+        let mut seconds = Vec::new();
+        for result in self.best_of_each(screening) {
+            let gain = result.score.gain;
+            let must_settle = gain <= partner.inflation * threshold;
+            if must_settle {
+                if partner.inflation <= DISCREPANT || excess <= 0.0 || gain < SHARE * excess {
+                    continue;
+                }
+                let own = optimum.unimitated(&result.influence.of_train(self.cache)?);
+                let left = optimum.residual() - own * result.score.amplitude;
+                if gain <= threshold * inflation(&self.cache.rows, &left.rows(0, n).into_owned()) {
+                    continue;
+                }
+            }
+            seconds.push(Second { result, must_settle });
+            if seconds.len() == MOST {
+                break;
+            }
         }
-        let optimum = partner.fit.optimum()?;
-        let own = optimum.unimitated(&second.influence.of_train(self.cache)?);
-        let left = optimum.residual() - own * second.score.amplitude;
-        Ok(gain > inflation(&self.cache.rows, &left.rows(0, n).into_owned()) * threshold)
+        Ok(seconds)
     }
 
     /// Scores the candidates at the refitted variant at a position, and notes the fall of χ² that they and modulated forms of its
@@ -145,7 +161,7 @@ impl<'c> Searcher<'_, '_, 'c> {
         &mut self,
         found: &SearchResult<'c>,
         best: &JudgedFit<'c>,
-        seconds: &[ScreeningResult],
+        seconds: &[Second],
         options: &Options,
     ) -> Result<Vec<FittedVariant<'c>>, ExplainError> {
         let tried = |indices: &[usize]| {
@@ -155,8 +171,9 @@ impl<'c> Searcher<'_, '_, 'c> {
             })
         };
         let mut fits = Vec::new();
-        for second in seconds {
-            if !tried(&[second.candidate])
+        for Second { result: second, must_settle } in seconds {
+            if !must_settle
+                && !tried(&[second.candidate])
                 && let Some(alone) =
                     self.best_of_each(&found.screening).iter().find(|h| h.candidate == second.candidate)
             {
@@ -189,6 +206,19 @@ impl<'c> Searcher<'_, '_, 'c> {
         }
         of
     }
+}
+
+/// Leaves out what a partner with this name became with a further effect that should settle what it leaves, and does not.
+fn drop_unsettled(found: &mut SearchResult<'_>, partner: &str, seconds: &[Second]) {
+    let Some(part) = found.judged.iter().find(|j| j.fit.variant.name() == partner) else { return };
+    let must_settle = |judged: &JudgedFit<'_>| {
+        let last = judged.fit.variant.effects.last().map(|effect| effect.index);
+        let of_partner = judged.fit.variant.effects.len() == part.fit.variant.effects.len() + 1;
+        of_partner && seconds.iter().any(|second| second.must_settle && Some(second.result.candidate) == last)
+    };
+    let keep: Vec<bool> = found.judged.iter().map(|j| !must_settle(j) || settles(j, part)).collect();
+    let mut keep = keep.into_iter();
+    found.judged.retain(|_| keep.next().unwrap_or(true));
 }
 
 /// First and last training time of a study.

@@ -67,7 +67,7 @@ pub(crate) fn proposals(
         let run = ReferenceRun { study, theta, tracks: &near_data };
         let Some(recovered) = Recovered::new(&run, input) else { continue };
         let is_new = |def: &EffectDef| !known.iter().any(|other| same_form(&other.def, def));
-        let of_equation: Vec<Candidate> = grammar(study, &input.state, tracks)
+        let of_equation: Vec<Candidate> = grammar(study, &input.state, &near_data)
             .into_iter()
             .filter(is_new)
             .map(|def| Candidate::new(def).of_kind(Kind::Proposal))
@@ -121,7 +121,8 @@ pub(crate) fn along(
     effects: &[(&Candidate, Vec<f64>)],
     input: &UnknownInput,
 ) -> Vec<f64> {
-    let run = ReferenceRun { study, theta, tracks };
+    let near_data = near_data(study, tracks, input);
+    let run = ReferenceRun { study, theta, tracks: &near_data };
     let mut sum: Vec<f64> = Vec::new();
     for (candidate, values) in effects.iter().filter(|(c, _)| c.def.adds.iter().any(|a| a.to == input.state))
     {
@@ -180,4 +181,20 @@ fn between(times: &[f64], course: &[f64], t: f64) -> f64 {
 /// The position of each of these times among those of a record, the last before it.
 fn steps(times: &[f64], wanted: &[f64]) -> Vec<usize> {
     wanted.iter().map(|t| times.partition_point(|known| known <= t).saturating_sub(1)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn between_its_times_a_course_goes_straight_and_stays_beyond_them() {
+        let at = |t| between(&[1.0, 2.0, 4.0], &[10.0, 20.0, 0.0], t);
+        for (t, value) in
+            [(0.0, 10.0), (1.0, 10.0), (1.5, 15.0), (2.0, 20.0), (3.0, 10.0), (4.0, 0.0), (9.0, 0.0)]
+        {
+            assert!((at(t) - value).abs() < 1e-12, "{t}");
+        }
+        assert!(between(&[], &[], 1.0).is_nan());
+    }
 }

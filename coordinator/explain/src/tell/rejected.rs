@@ -84,7 +84,7 @@ fn behind(found: &SearchResult<'_>, decision: &Decision, i: usize) -> String {
     {
         return format!(
             "beyond `{name}` it takes away {:.1} % of the gap on the training data{}: a further effect must carry a tenth of {}, or \
-             leave nothing but noise of a discrepancy",
+             settle a discrepancy that the first leaves",
             100.0 * train,
             held_out.map_or_else(String::new, |h| format!(" and {:.1} % on the held-out span", 100.0 * h)),
             if held_out.is_some() { "what was held out, and of both on average" } else { "it" }

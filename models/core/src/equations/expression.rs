@@ -59,8 +59,15 @@ impl Expression {
         linear::split(&self.node, &[name.to_owned()]).is_ok()
     }
 
-    /// Whether the names that `moves` chooses enter as powers in a product only: in no sum, no function and no condition.
+    /// Whether the names that `moves` chooses, and the time, enter as powers in a product only: in no sum, no function and no condition.
     pub fn is_product_in(&self, moves: &dyn Fn(&str) -> bool) -> bool {
+        fn varies(part: &Node, moves: &dyn Fn(&str) -> bool) -> bool {
+            let mut found = false;
+            part.walk(&mut |n| {
+                found |= matches!(n, Node::Time) || n.name().is_some_and(|name| moves(&name.text));
+            });
+            found
+        }
         fn is_product(part: &Node, moves: &dyn Fn(&str) -> bool) -> bool {
             match part {
                 Node::Number(_) | Node::Time | Node::Name(_) => true,
@@ -68,14 +75,8 @@ impl Expression {
                 Node::Pair(Operation::Mul | Operation::Div, a, b) => {
                     is_product(a, moves) && is_product(b, moves)
                 }
-                Node::Pair(Operation::Pow, a, power) if matches!(**power, Node::Number(_)) => {
-                    is_product(a, moves)
-                }
-                _ => {
-                    let mut found = false;
-                    part.walk(&mut |n| found |= n.name().is_some_and(|name| moves(&name.text)));
-                    !found
-                }
+                Node::Pair(Operation::Pow, a, power) if !varies(power, moves) => is_product(a, moves),
+                _ => !varies(part, moves),
             }
         }
         is_product(&self.node, moves)

@@ -243,12 +243,13 @@ impl Forward {
                 }
             };
             let z = &past.factor * &mean;
-            let p = &past.factor * &covariance * past.factor.transpose();
+            let input = past.factor.row(n_scalar);
+            let variance = (input * &covariance * input.transpose())[(0, 0)];
             for (i, course) in states.iter_mut().enumerate() {
                 course[index] = past.mean[i] + z[i];
             }
             value[index] = past.mean[n_scalar] + z[n_scalar];
-            sd[index] = p[(n_scalar, n_scalar)].max(0.0).sqrt();
+            sd[index] = variance.max(0.0).sqrt();
             later = Some((mean, covariance));
         }
         let time = self.past.iter().map(|p| p.time).collect();

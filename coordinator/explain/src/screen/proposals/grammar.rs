@@ -17,7 +17,7 @@ use crate::locate::Track;
 
 /// Quantities that enter at most, those of the study's order: the number of terms grows with its square.
 const MOST: usize = 6;
-/// Part of a quantity's swing below which its root and its inverse go straight to zero.
+/// Part of a quantity's swing below which its root goes straight to zero and its inverse stays finite.
 const WIDTH: f64 = 0.02;
 
 /// A state or input with the ends of its course.
@@ -78,9 +78,8 @@ pub(super) fn grammar(study: &Study, state: &str, tracks: &[Track]) -> Vec<Effec
             equation.of_two(q, p);
         }
     }
-    let rates = study.setup.model.equations.iter().flat_map(|of| own_rates::own_rates(of, &signals));
-    for rate in rates {
-        equation.of_rate(&rate, &signals);
+    if let Some(equations) = &study.setup.model.equations {
+        equation.of_rates(&own_rates::own_rates(equations, &signals), &signals);
     }
     equation.made
 }
@@ -223,9 +222,14 @@ impl Equation<'_> {
     }
 
     fn push(&mut self, name: String, says: &str, term: String, parameters: Vec<EffectParameter>) {
+        let def = self.def(name, says, term, parameters);
+        self.made.push(def);
+    }
+
+    fn def(&self, name: String, says: &str, term: String, parameters: Vec<EffectParameter>) -> EffectDef {
         let says = format!("The rate of {} lacks a term that {says}.", self.state.name);
         let adds = vec![Addition { to: self.state.name.clone(), term }];
-        self.made.push(EffectDef { name, says, adds, parameters, ..EffectDef::default() });
+        EffectDef { name, says, adds, parameters, ..EffectDef::default() }
     }
 
     /// The label of the rate's unit over that of a term's factors, in their symbols; empty where one of them has none that can be read.
@@ -245,4 +249,27 @@ fn coefficient(what: &str, stem: &str, told: &[&str]) -> String {
 
 fn parameter(name: &str, unit: String) -> EffectParameter {
     EffectParameter { name: name.to_owned(), unit, ..EffectParameter::default() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quotients_need_a_divisor_that_keeps_from_zero_and_carry_their_unit() {
+        let of = [Quantity::new("u", "m/s^2"), Quantity::new("h", "m")];
+        let [u, h] = [Signal { of: &of[0], ends: [-1.0, 1.0] }, Signal { of: &of[1], ends: [0.5, 2.5] }];
+        let state = Quantity::new("v", "m/s");
+        let mut equation = Equation { state: &state, time: "s", made: Vec::new() };
+        equation.of_one(&h);
+        equation.of_two(&u, &h);
+        let unit = |name: &str| {
+            let def = equation.made.iter().find(|def| def.name == name)?;
+            Some(def.parameters[0].unit.clone())
+        };
+        assert_eq!(unit("over:v:u:h").as_deref(), Some("m"));
+        assert_eq!(unit("over-square:v:u:h").as_deref(), Some("m^2"));
+        assert_eq!(unit("inverse-square:v:h").as_deref(), Some("m^3/s^2"));
+        assert!(unit("over:v:h:u").is_none() && unit("over-square:v:h:u").is_none());
+    }
 }
