@@ -4,8 +4,9 @@
 //! discrepancy of another kind remains; unless it settles that one, so that nothing but noise is left, however small it is beside what its
 //! partner takes away. Next file to read: [`super::verdict`].
 
-use super::adequacy::AS_STATED;
+use super::adequacy::{AS_STATED, Adequacy};
 use super::gates::JudgedFit;
+use super::held_out::HeldOut;
 use super::misfit::Misfit;
 use super::search_result::SearchResult;
 
@@ -73,9 +74,11 @@ pub(crate) fn lacking_shares(
 /// Whether a further effect settles what its partner leaves: a discrepancy of another kind, of which nothing is left but noise of the stated
 /// size, held out or not. How uncertain a noise is that was found excuses nothing here.
 pub(crate) fn settles(whole: &JudgedFit<'_>, part: &JudgedFit<'_>) -> bool {
-    let of_noise = &whole.adequacy;
-    let is_noise = !of_noise.is_gap() && of_noise.rmse_over_noise.powi(2) <= AS_STATED[1];
-    part.inflation > DISCREPANT && is_noise && !whole.held_out.iter().any(|h| h.fails)
+    part.inflation > DISCREPANT && is_noise(&whole.adequacy, &whole.held_out)
+}
+
+fn is_noise(left: &Adequacy, held_out: &[HeldOut]) -> bool {
+    !left.is_gap() && left.rmse_over_noise.powi(2) <= AS_STATED[1] && !held_out.iter().any(|h| h.fails)
 }
 
 /// The share of a whole's fall of χ² that a part of it lacks: of the training rows, and of the held-out span where there is one.
@@ -99,6 +102,35 @@ fn carries_its_share(train: f64, held_out: Option<f64>) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn only_noise_of_its_size_is_settled_however_uncertain_that_size_and_nothing_held_out_may_fail() {
+        let left = |rmse_over_noise: f64, whiteness: f64, noise_freedom: f64| Adequacy {
+            n: 200,
+            rmse_over_noise,
+            whiteness: Some(whiteness),
+            inflation: rmse_over_noise.powi(2),
+            over_spread: 0.1,
+            noise_freedom,
+        };
+        let held_out = |fails: bool| HeldOut {
+            record: "record".to_owned(),
+            channel: "channel".to_owned(),
+            usage: "held-out".to_owned(),
+            n: 80,
+            before: 40.0,
+            after: 1.0,
+            beyond: 1.0,
+            fails,
+            mended: 1.0,
+        };
+        let (white, known) = (0.4, f64::INFINITY);
+        assert!(is_noise(&left(1.01, white, known), &[held_out(false)]));
+        assert!(!is_noise(&left(1.01, 1e-9, known), &[held_out(false)]), "correlated");
+        assert!(!is_noise(&left(1.01, white, known), &[held_out(false), held_out(true)]));
+        let uncertain = left(1.48, white, 3.0);
+        assert!(!uncertain.is_gap() && !is_noise(&uncertain, &[]), "a size that was found");
+    }
 
     #[test]
     fn what_was_held_out_makes_up_for_a_small_share_of_what_was_fitted_and_not_the_other_way_round() {

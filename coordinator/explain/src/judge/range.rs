@@ -2,6 +2,7 @@
 //!
 //! Next file to read: [`super::gates`].
 
+use starlings_models::effect::EffectParameter;
 use starlings_models::units::spaced;
 
 use super::gates::Refusal;
@@ -22,21 +23,26 @@ pub(super) fn at_edge(fit: &FittedVariant<'_>) -> Option<Refusal> {
             let j = variant.first_entry_of(m) + k;
             let value = variant.study.theta[j].transform.to_physical(theta[j]);
             let Some(end) = end_at(effect, k, value) else { continue };
-            let is_sign = k == 0 && end.abs() < f64::MIN_POSITIVE;
-            let (gate, of, what) = if is_sign {
-                ("sign", "what physics allows", "physics")
-            } else {
-                ("range", "its range", "value")
-            };
-            let (name, unit) = (&parameter.name, spaced(&parameter.unit));
-            let reason = format!(
-                "the best value of {name} lies at the end of {of} ({}{unit}): the shape fits, the {what} does not",
-                three(end)
-            );
-            return Some(Refusal { gate, reason });
+            return Some(refusal(parameter, k == 0, end));
         }
     }
     None
+}
+
+/// The refusal for a parameter at an end of its range: of an amplitude at zero, the sign.
+fn refusal(parameter: &EffectParameter, is_amplitude: bool, end: f64) -> Refusal {
+    let (gate, of, what) = if is_amplitude && end.abs() < f64::MIN_POSITIVE {
+        ("sign", "what physics allows", "physics")
+    } else {
+        ("range", "its range", "value")
+    };
+    let reason = format!(
+        "the best value of {} lies at the end of {of} ({}{}): the shape fits, the {what} does not",
+        parameter.name,
+        three(end),
+        spaced(&parameter.unit)
+    );
+    Refusal { gate, reason }
 }
 
 /// The end of the range of an effect's parameter `k` at which a value lies. Where the range is open at one side, the unit of the
@@ -65,7 +71,29 @@ mod tests {
     use super::*;
     use crate::fit::candidate::Candidate;
     use starlings_models::EffectDef;
-    use starlings_models::effect::EffectParameter;
+
+    #[test]
+    fn an_amplitude_at_zero_lacks_its_sign_and_any_other_end_is_one_of_a_range() {
+        let parameter =
+            EffectParameter { name: "tau".to_owned(), unit: "min".to_owned(), ..EffectParameter::default() };
+        let of = |is_amplitude, end| {
+            let Refusal { gate, reason } = refusal(&parameter, is_amplitude, end);
+            format!("{gate}: {reason}")
+        };
+        let begin = "the best value of tau lies at the end of";
+        assert_eq!(
+            of(true, 0.0),
+            format!("sign: {begin} what physics allows (0 min): the shape fits, the physics does not")
+        );
+        assert_eq!(
+            of(false, 0.0),
+            format!("range: {begin} its range (0 min): the shape fits, the value does not")
+        );
+        assert_eq!(
+            of(true, 300.0),
+            format!("range: {begin} its range (300 min): the shape fits, the value does not")
+        );
+    }
 
     #[test]
     fn closeness_to_the_end_of_an_open_range_is_measured_in_the_parameters_own_size() {

@@ -2,6 +2,7 @@
 //!
 //! Next files to read: [`crate::judge::form`], then [`crate::judge::verdict`].
 
+use starlings_estimators::Optimum;
 use starlings_study::{Record, Study};
 
 use super::modulated_forms::{constants, modulated_forms};
@@ -51,10 +52,10 @@ impl<'c> Searcher<'_, '_, 'c> {
             if seconds.is_empty() {
                 break;
             }
-            let fits = self.replacements_and_pairs(found, best, &seconds, options)?;
+            let (fits, to_settle) = self.replacements_and_pairs(found, best, &seconds, options)?;
             let n = fits.len();
             self.judge_all(found, fits)?;
-            drop_unsettled(found, &name, &seconds);
+            drop_unsettled(found, &name, &to_settle);
             let same = found.judged.first().is_some_and(|j| j.fit.variant.name() == name);
             if n == 0 || same {
                 break;
@@ -69,36 +70,44 @@ impl<'c> Searcher<'_, '_, 'c> {
         Ok(())
     }
 
-    /// The two best further effects that gain more than chance: in units of the noise that their partner leaves, or, where that is a
-    /// discrepancy of its own, most of which one takes, of the noise that both leave.
+    /// The two best further effects that gain more than chance.
     fn seconds(
         &self,
         partner: &JudgedFit<'c>,
         screening: &[ScreeningResult],
         threshold: f64,
     ) -> Result<Vec<Second>, ExplainError> {
-        let (optimum, n) = (partner.fit.optimum()?, self.cache.rows.train.len());
-        let excess = partner.fit.residual().norm_squared() - n as f64;
+        let optimum = partner.fit.optimum()?;
         let mut seconds = Vec::new();
         for result in self.best_of_each(screening) {
-            let gain = result.score.gain;
-            let must_settle = gain <= partner.inflation * threshold;
-            if must_settle {
-                if partner.inflation <= DISCREPANT || excess <= 0.0 || gain < SHARE * excess {
-                    continue;
-                }
-                let own = optimum.unimitated(&result.influence.of_train(self.cache)?);
-                let left = optimum.residual() - own * result.score.amplitude;
-                if gain <= threshold * inflation(&self.cache.rows, &left.rows(0, n).into_owned()) {
-                    continue;
-                }
+            let must_settle = result.score.gain <= partner.inflation * threshold;
+            if !must_settle || self.may_settle(partner, &optimum, &result, threshold)? {
+                seconds.push(Second { result, must_settle });
             }
-            seconds.push(Second { result, must_settle });
             if seconds.len() == MOST {
                 break;
             }
         }
         Ok(seconds)
+    }
+
+    /// Whether a further effect takes most of what its partner leaves, a discrepancy of its own, and gains more than chance in units of the
+    /// noise that both leave.
+    fn may_settle(
+        &self,
+        partner: &JudgedFit<'c>,
+        optimum: &Optimum,
+        second: &ScreeningResult,
+        threshold: f64,
+    ) -> Result<bool, ExplainError> {
+        let (gain, n) = (second.score.gain, self.cache.rows.train.len());
+        let excess = partner.fit.residual().norm_squared() - n as f64;
+        if partner.inflation <= DISCREPANT || excess <= 0.0 || gain < SHARE * excess {
+            return Ok(false);
+        }
+        let own = optimum.unimitated(&second.influence.of_train(self.cache)?);
+        let left = optimum.residual() - own * second.score.amplitude;
+        Ok(gain > threshold * inflation(&self.cache.rows, &left.rows(0, n).into_owned()))
     }
 
     /// Scores the candidates at the refitted variant at a position, and notes the fall of χ² that they and modulated forms of its
@@ -156,21 +165,17 @@ impl<'c> Searcher<'_, '_, 'c> {
         screen(self.cache, &best.fit, &forms, &of, self.tracks)
     }
 
-    /// Refits replacements (a second effect alone, where it was not refitted yet) and pairs.
+    /// Refits replacements (a second effect alone, where it was not refitted yet) and pairs. With them come the candidates of those pairs
+    /// that count only if they settle what the best leaves.
     fn replacements_and_pairs(
         &mut self,
         found: &SearchResult<'c>,
         best: &JudgedFit<'c>,
         seconds: &[Second],
         options: &Options,
-    ) -> Result<Vec<FittedVariant<'c>>, ExplainError> {
-        let tried = |indices: &[usize]| {
-            found.judged.iter().any(|j| {
-                let effects: Vec<usize> = j.fit.variant.effects.iter().map(|m| m.index).collect();
-                effects.len() == indices.len() && indices.iter().all(|i| effects.contains(i))
-            })
-        };
-        let mut fits = Vec::new();
+    ) -> Result<(Vec<FittedVariant<'c>>, Vec<Vec<usize>>), ExplainError> {
+        let tried = |indices: &[usize]| found.judged.iter().any(|j| j.fit.variant.has_just(indices));
+        let (mut fits, mut to_settle) = (Vec::new(), Vec::new());
         for Second { result: second, must_settle } in seconds {
             if !must_settle
                 && !tried(&[second.candidate])
@@ -183,11 +188,14 @@ impl<'c> Searcher<'_, '_, 'c> {
             pair.push(second.candidate);
             if pair.len() <= options.max_effects && !tried(&pair) {
                 fits.push(self.with_candidate(&best.fit, second)?);
+                if *must_settle {
+                    to_settle.push(pair);
+                }
             }
         }
         self.cache.foreseen.goes(Course::Beside(fits.len()));
         self.cache.stage("refit", &format!("{} replacements and pairs", fits.len()));
-        self.refit(fits)
+        Ok((self.refit(fits)?, to_settle))
     }
 
     /// The best point of the grid of every candidate, by the first screening.
@@ -208,17 +216,15 @@ impl<'c> Searcher<'_, '_, 'c> {
     }
 }
 
-/// Leaves out what a partner with this name became with a further effect that should settle what it leaves, and does not.
-fn drop_unsettled(found: &mut SearchResult<'_>, partner: &str, seconds: &[Second]) {
+/// Leaves out those of these pairs, by their candidates, that do not settle what their partner, of this name, leaves.
+fn drop_unsettled(found: &mut SearchResult<'_>, partner: &str, pairs: &[Vec<usize>]) {
     let Some(part) = found.judged.iter().find(|j| j.fit.variant.name() == partner) else { return };
-    let must_settle = |judged: &JudgedFit<'_>| {
-        let last = judged.fit.variant.effects.last().map(|effect| effect.index);
-        let of_partner = judged.fit.variant.effects.len() == part.fit.variant.effects.len() + 1;
-        of_partner && seconds.iter().any(|second| second.must_settle && Some(second.result.candidate) == last)
+    let is_dropped = |judged: &JudgedFit<'_>| {
+        pairs.iter().any(|pair| judged.fit.variant.has_just(pair)) && !settles(judged, part)
     };
-    let keep: Vec<bool> = found.judged.iter().map(|j| !must_settle(j) || settles(j, part)).collect();
-    let mut keep = keep.into_iter();
-    found.judged.retain(|_| keep.next().unwrap_or(true));
+    let dropped: Vec<bool> = found.judged.iter().map(is_dropped).collect();
+    let mut dropped = dropped.into_iter();
+    found.judged.retain(|_| dropped.next() == Some(false));
 }
 
 /// First and last training time of a study.

@@ -63,11 +63,11 @@ pub(crate) fn proposals(
     let mut all = Proposals::default();
     for input in inputs {
         // Along the model as it is, far from the data, a term is not what it is where they were measured.
-        let near_data = near_data(study, tracks, input);
-        let run = ReferenceRun { study, theta, tracks: &near_data };
+        let tracks = near_data(study, tracks, input);
+        let run = ReferenceRun { study, theta, tracks: &tracks };
         let Some(recovered) = Recovered::new(&run, input) else { continue };
         let is_new = |def: &EffectDef| !known.iter().any(|other| same_form(&other.def, def));
-        let of_equation: Vec<Candidate> = grammar(study, &input.state, &near_data)
+        let of_equation: Vec<Candidate> = grammar(study, &input.state, &tracks)
             .into_iter()
             .filter(is_new)
             .map(|def| Candidate::new(def).of_kind(Kind::Proposal))
@@ -121,8 +121,8 @@ pub(crate) fn along(
     effects: &[(&Candidate, Vec<f64>)],
     input: &UnknownInput,
 ) -> Vec<f64> {
-    let near_data = near_data(study, tracks, input);
-    let run = ReferenceRun { study, theta, tracks: &near_data };
+    let tracks = near_data(study, tracks, input);
+    let run = ReferenceRun { study, theta, tracks: &tracks };
     let mut sum: Vec<f64> = Vec::new();
     for (candidate, values) in effects.iter().filter(|(c, _)| c.def.adds.iter().any(|a| a.to == input.state))
     {

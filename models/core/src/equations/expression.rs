@@ -54,6 +54,15 @@ impl Expression {
         found
     }
 
+    /// Whether the slope or the past of a name stands in it.
+    pub fn has_memory(&self) -> bool {
+        let mut found = false;
+        self.node.walk(&mut |part| {
+            found |= matches!(part, Node::Delay(..) | Node::DelayedSlope(..) | Node::Ddt(_));
+        });
+        found
+    }
+
     /// Whether it is a sum of terms in each of which the name stands as a factor once or not at all.
     pub fn is_linear_in(&self, name: &str) -> bool {
         linear::split(&self.node, &[name.to_owned()]).is_ok()

@@ -1,7 +1,7 @@
 //! Terms made of the rates that the model has: in an equation where they are missing, or changing with a quantity or with time.
 //!
-//! What a reaction uses up may heat as well, a loss to the surroundings may grow with the wind, and a coefficient may age. A rate that is a
-//! product of quantities has these terms in the rest of the grammar, and what is in a sum or a function of the model only here. Next file to
+//! What a reaction uses up may heat as well, a loss to the surroundings may grow with the wind, and a coefficient may age. What stands in a
+//! sum or a function of the model is nowhere else in the grammar; a rate that is a mere product of quantities is left to its products. Next file to
 //! read: [`super::super`].
 
 use starlings_models::EffectDef;
@@ -28,7 +28,7 @@ impl OwnRate<'_> {
 }
 
 /// The rates of the states of the grammar in which a quantity stands in a sum or a function. None that reads an output, which is no quantity of
-/// the grammar, or a slope or the past, which no effect may read of a state.
+/// the grammar, or a slope or the past, which not every effect may read.
 pub(super) fn own_rates<'a>(equations: &'a EquationsDef, signals: &[Signal<'_>]) -> Vec<OwnRate<'a>> {
     let is_of_grammar = |name: &str| signals.iter().any(|s| s.name() == name);
     let moves = |name: &str| {
@@ -38,8 +38,7 @@ pub(super) fn own_rates<'a>(equations: &'a EquationsDef, signals: &[Signal<'_>])
     let is_output = |name: &str| !moves(name) && equations.outputs.iter().any(|output| output.name == name);
     let is_readable = |rate: &OwnRate<'_>| {
         let Ok(e) = Expression::parse(rate.text) else { return false };
-        let has_memory = ["ddt(", "delay("].iter().any(|call| rate.text.contains(call));
-        !has_memory && !e.is_product_in(&moves) && !e.names().iter().any(|(name, _)| is_output(name))
+        !e.has_memory() && !e.is_product_in(&moves) && !e.names().iter().any(|(name, _)| is_output(name))
     };
     let states = equations.states.iter().filter(|state| is_of_grammar(&state.name));
     let rates = states.flat_map(|state| {
@@ -147,6 +146,7 @@ mod tests {
             ]
         );
     }
+
     #[test]
     fn a_rate_that_two_equations_have_enters_a_third_once_and_neither_of_them() {
         let state = |name: &str, rate: &str| StateDef {
@@ -159,13 +159,14 @@ mod tests {
                 state("a", "-k*exp(-4000/T)*a"),
                 state("b", "k*exp(-4000/T)*a"),
                 state("T", "u*delay(a, 2) - u*T"),
+                state("w", "u*ddt(a) - u*w"),
             ],
             ..EquationsDef::default()
         };
-        let of = ["a", "b", "T"].map(|name| Quantity::new(name, ""));
+        let of = ["a", "b", "T", "w"].map(|name| Quantity::new(name, ""));
         let signals: Vec<Signal<'_>> = of.iter().map(|of| Signal { of, ends: [1.0, 2.0] }).collect();
         let rates = own_rates(&equations, &signals);
-        assert_eq!(rates.len(), 2, "none that reads the past");
+        assert_eq!(rates.len(), 2, "none that reads a slope or the past");
         let terms = |state: &Quantity| {
             let mut equation = Equation { state, time: "s", made: Vec::new() };
             equation.of_rates(&rates, &signals);
