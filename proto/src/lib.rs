@@ -12,6 +12,7 @@ pub mod convert;
 pub mod descriptors;
 pub mod host;
 pub mod private_file;
+mod program;
 pub mod socket;
 pub mod spent;
 pub mod text;
@@ -24,6 +25,8 @@ pub use convert::{
     ProtocolError, ReceivedWindows, SentWindows, SetupId, State, StateId, StateNaming, ToWorker, Welcome,
     decode_setup, digest, encode_setup, job_key,
 };
+
+pub use program::{BUILD, build_of_file, own_build};
 
 /// Number of the protocol; coordinator and worker must have the same.
 pub const PROTOCOL: u32 = 7;
@@ -54,20 +57,6 @@ pub const LIFELINE: &str = "STARLINGS_LIFELINE";
 
 /// Package version sent in [`Hello`]; unequal versions are refused, since they may not give the same bits.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
-
-/// BLAKE3 of the running program; `None` when it cannot be read.
-pub fn own_build() -> Option<[u8; 32]> {
-    static OWN: std::sync::OnceLock<Option<[u8; 32]>> = std::sync::OnceLock::new();
-    // The file that this process runs, also after another was put in its place.
-    let running =
-        || std::fs::File::open("/proc/self/exe").or_else(|_| std::fs::File::open(std::env::current_exe()?));
-    *OWN.get_or_init(|| {
-        // Piece by piece: the whole would be most of what a small run ever holds.
-        let mut hasher = blake3::Hasher::new();
-        hasher.update_reader(running().ok()?).ok()?;
-        Some(*hasher.finalize().as_bytes())
-    })
-}
 
 /// Types and service stubs generated from `proto/fleet.proto`.
 #[allow(missing_docs, unreachable_pub, clippy::all, clippy::pedantic, rust_2018_idioms)]

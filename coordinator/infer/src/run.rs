@@ -2,7 +2,7 @@
 //!
 //! Next file to read: `gather.rs`.
 
-use starlings_estimators::inference::{Fit, Sums};
+use starlings_estimators::inference::{Fit, Pairs, Sums};
 use starlings_fleet::Fleet;
 use starlings_models::Setup;
 use starlings_study::Study;
@@ -10,13 +10,14 @@ use starlings_study::infer_choice::{InferChoice, InferRecord, MeasuredChoice};
 use starlings_sums::Question;
 
 use crate::answer::{Answer, fit};
-use crate::blocks::{Cut, Start, start};
+use crate::blocks::{Cut, Start, length, start};
 use crate::convergence::Convergence;
 use crate::doubts::Doubts;
 use crate::error::InferError;
 use crate::file_blocks::files;
 use crate::gather::{Gathered, Source, Work};
 use crate::missing::Wider;
+use crate::parts::Parts;
 use crate::progress::{Progress, Teller};
 use crate::reduced::{check_reduced, fit_reduced};
 use crate::result::{Converging, Inference, MissingFound, RecordUsed};
@@ -27,6 +28,8 @@ const BLOCKS: f64 = 64.0;
 /// Steps of such a block, at least and at most.
 const LEAST: usize = 256;
 const MOST: usize = 65_536;
+/// Blocks from which on they are longer instead of more, up to twice as long: each is a job that is sent and answered.
+const MANY: f64 = 512.0;
 
 /// What is asked, once the first recording has said its step.
 pub(crate) struct Asked<'a> {
@@ -34,6 +37,17 @@ pub(crate) struct Asked<'a> {
     pub(crate) setup: Setup,
     pub(crate) question: Question,
     pub(crate) fit: Fit,
+}
+
+impl Asked<'_> {
+    /// Has each of so many blocks give its share of the pairs that are kept: more would be sent and thrown away.
+    fn share_pairs(&mut self, n_block: u64) {
+        let share = Pairs::share(self.question.basis.n_channel(), n_block);
+        self.question.pairs = share;
+        if let Some(sums) = &mut self.setup.sums {
+            sums.pairs = Some(share);
+        }
+    }
 }
 
 /// Who reads the recordings.
@@ -61,8 +75,11 @@ pub fn infer(
         return Err(InferError::Setting("the study has no record to infer from".to_owned()));
     };
     let at = start(first)?;
-    let asked = asked(study, choice, at.step)?;
+    let mut asked = asked(study, choice, at.step)?;
     let cut = cut(choice, &asked, at);
+    if let Some(bytes) = cut.bytes {
+        asked.share_pairs(choice.records.iter().map(|record| Parts::new(0, length(record), bytes).n).sum());
+    }
     let mut teller = Teller::new(choice, cut, at, watch);
     let (gathered, convergence) = gathered(&asked, &choice.records, cut, fleet, (reader, &mut teller))?;
     let structure = &asked.question.structure;
@@ -202,7 +219,8 @@ pub(crate) fn asked<'a>(study: &Study, choice: &'a InferChoice, step: f64) -> Re
 
 fn cut(choice: &InferChoice, asked: &Asked<'_>, at: Start) -> Cut {
     let sums = asked.setup.sums.as_deref();
-    let usual = ((at.n_row / BLOCKS) as usize).clamp(LEAST, MOST);
+    let long = ((at.n_row / MANY) as usize).min(2 * MOST).min(choice.most_steps);
+    let usual = ((at.n_row / BLOCKS) as usize).clamp(LEAST, MOST).max(long);
     // Where the study does not say how many steps: by bytes, which nobody has to read the file for.
     let by_bytes =
         choice.block.is_none() && !choice.resample && usual <= choice.most_steps && at.n_row >= 1.0;

@@ -58,12 +58,18 @@ impl Pairs {
         Self { n_channel, stride: 1, offered: 0, values: Vec::new(), weights: Vec::new() }
     }
 
-    /// Those of a block in which `n_step` steps start, from its times and its rows one after the other.
-    pub fn of_block(times: &[f64], rows: &[f64], n_channel: usize, n_step: usize) -> Self {
+    /// How many each of so many blocks has to give, so that together they are as many as are kept of a recording.
+    pub fn share(n_channel: usize, n_block: u64) -> usize {
+        let most = Self::new(n_channel).most() as u64;
+        (most / n_block.max(1)).clamp(1, OF_BLOCK as u64) as usize
+    }
+
+    /// Those of a block in which `n_step` steps start, from its times and its rows one after the other, `most` at most.
+    pub fn of_block(times: &[f64], rows: &[f64], n_channel: usize, n_step: usize, most: usize) -> Self {
         let mut pairs = Self::new(n_channel);
         let n_row = times.len().min(rows.len() / n_channel.max(1));
         let n_step = n_step.min(n_row.saturating_sub(1));
-        let (there, kept) = (n_step / 2, Self::n_of_block(n_step, n_channel));
+        let (there, kept) = (n_step / 2, Self::n_of_block(n_step, n_channel, most));
         let apart = there as f64 / kept as f64;
         let mut random = ChaCha8Rng::seed_from_u64(times.first().map_or(0, |time| time.to_bits()));
         for k in 0..kept {
@@ -76,9 +82,9 @@ impl Pairs {
         pairs.of_steps(n_step as u64)
     }
 
-    /// Number of pairs of a block of so many steps.
-    fn n_of_block(n_step: usize, n_channel: usize) -> usize {
-        (n_step / 2).min(OF_BLOCK).min(OF_BLOCK_NUMBERS / (1 + ROWS * n_channel))
+    /// Number of pairs of a block of so many steps that gives `most` at most.
+    fn n_of_block(n_step: usize, n_channel: usize, most: usize) -> usize {
+        (n_step / 2).min(most).min(OF_BLOCK).min(OF_BLOCK_NUMBERS / (1 + ROWS * n_channel))
     }
 
     /// As those of a block of so many steps.
@@ -154,13 +160,19 @@ impl Pairs {
         &self.values
     }
 
-    /// The pairs of a block of so many steps from numbers that came from elsewhere.
+    /// The pairs of a block of so many steps that gives `most` at most, from numbers that came from elsewhere.
     ///
     /// # Errors
     /// `Damaged` where they are not as many as such a block has, or not finite.
-    pub fn from_values(basis: &Basis, n_step: u64, values: &[f64]) -> Result<Self, InferenceError> {
+    pub fn from_values(
+        basis: &Basis,
+        n_step: u64,
+        most: usize,
+        values: &[f64],
+    ) -> Result<Self, InferenceError> {
         let pairs = Self { values: values.to_vec(), ..Self::new(basis.n_channel()) };
-        let n = Self::n_of_block(usize::try_from(n_step).unwrap_or(usize::MAX), basis.n_channel());
+        let n_step_here = usize::try_from(n_step).unwrap_or(usize::MAX);
+        let n = Self::n_of_block(n_step_here, basis.n_channel(), most);
         if n * pairs.size() != values.len() || values.iter().any(|v| !v.is_finite()) {
             return Err(InferenceError::Damaged { what: "the pairs of steps of a block" });
         }
@@ -175,7 +187,7 @@ mod tests {
     /// Pairs of a block of one channel that counts its rows from `first` on.
     fn block(first: usize, n_step: usize) -> Pairs {
         let rows: Vec<f64> = (first..=first + n_step).map(|k| k as f64).collect();
-        Pairs::of_block(&rows, &rows, 1, n_step)
+        Pairs::of_block(&rows, &rows, 1, n_step, usize::MAX)
     }
 
     fn starts(pairs: &Pairs) -> Vec<f64> {
@@ -203,6 +215,22 @@ mod tests {
             assert!(starts.windows(2).all(|pair| pair[1] >= pair[0] + 2.0), "{there} pairs");
             assert!(starts.iter().all(|time| *time <= (3 * there - 2) as f64), "{there} pairs");
         }
+    }
+
+    #[test]
+    fn many_blocks_share_what_is_kept_of_all() {
+        assert_eq!(Pairs::share(1, 1), OF_BLOCK);
+        assert_eq!(Pairs::share(1, 1 << 30), 1);
+        for (n_channel, n_block) in [(1, 200), (3, 963), (30, 400)] {
+            let share = Pairs::share(n_channel, n_block);
+            let most = Pairs::new(n_channel).most();
+            let all = share as u64 * n_block;
+            assert!((most as u64 / 2..=most as u64).contains(&all), "{n_channel} channels, {n_block} blocks");
+        }
+        let rows: Vec<f64> = (0..1001).map(f64::from).collect();
+        let few = Pairs::of_block(&rows, &rows, 1, 1000, 10);
+        assert_eq!(few.n_pair(), 10);
+        assert!(few.iter().all(|pair| (pair.weight - 100.0).abs() < 1e-12));
     }
 
     #[test]
@@ -239,11 +267,12 @@ mod tests {
     fn numbers_that_are_no_pairs_are_refused() {
         let basis = Basis::new(1, 0);
         let pairs = block(0, 50);
-        assert_eq!(Pairs::from_values(&basis, 50, pairs.to_values()), Ok(pairs.clone()));
+        assert_eq!(Pairs::from_values(&basis, 50, OF_BLOCK, pairs.to_values()), Ok(pairs.clone()));
         let values = pairs.to_values();
         for damaged in [values[1..].to_vec(), values[4..].to_vec(), vec![f64::NAN; 100], vec![0.0; 104]] {
-            assert!(Pairs::from_values(&basis, 50, &damaged).is_err());
+            assert!(Pairs::from_values(&basis, 50, OF_BLOCK, &damaged).is_err());
         }
-        assert!(Pairs::from_values(&basis, u64::MAX, values).is_err());
+        assert!(Pairs::from_values(&basis, u64::MAX, OF_BLOCK, values).is_err());
+        assert!(Pairs::from_values(&basis, 50, 24, values).is_err(), "more than were asked for");
     }
 }

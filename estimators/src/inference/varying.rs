@@ -136,8 +136,10 @@ struct Curve {
 impl Ranks {
     fn new(values: Vec<f64>) -> Self {
         let n = values.len();
-        let mut order: Vec<usize> = (0..n).collect();
-        order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
+        // Values beside their places: looking each up by its place would take most of the time.
+        let mut sorted: Vec<(f64, usize)> = values.iter().copied().zip(0..).collect();
+        sorted.sort_unstable_by(|(a, at), (b, other)| a.total_cmp(b).then(at.cmp(other)));
+        let order: Vec<usize> = sorted.into_iter().map(|(_, at)| at).collect();
         let mut ranks = vec![0.0; n];
         let mut first = 0;
         for equal in order.chunk_by(|a, b| values[*a].total_cmp(&values[*b]).is_eq()) {

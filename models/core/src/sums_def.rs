@@ -26,6 +26,9 @@ pub struct SumsDef {
     pub step: f64,
     /// Steps at which the sums are made, each twice the one before; 1 for the sampling step alone.
     pub levels: u32,
+    /// Pairs of neighbouring steps that a block gives beside its sums, at most; as many as it can where there is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pairs: Option<usize>,
     /// The recordings as files that workers read by themselves, by the number of the record; none where rows travel.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub files: Vec<SumsFile>,

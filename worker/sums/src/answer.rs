@@ -95,7 +95,8 @@ pub fn answer_of(
     let (sums, span) = values.split_at(expected - 2);
     let level = |(k, values)| Sums::from_values(&question.basis, step * f64::from(1_u32 << k), values);
     let levels = sums.chunks_exact(n).enumerate().map(level).collect::<Result<Vec<_>, _>>()?;
-    let pairs = Pairs::from_values(&question.basis, levels.first().map_or(0, Sums::n_step), pairs)?;
+    let pairs =
+        Pairs::from_values(&question.basis, levels.first().map_or(0, Sums::n_step), question.pairs, pairs)?;
     let span = [span[0], span[1]];
     if !(span[0] <= span[1] && span.iter().all(|end| end.is_finite())) {
         return Err(InferenceError::Damaged { what: "the times of a block" });

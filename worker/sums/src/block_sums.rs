@@ -94,7 +94,8 @@ impl BlockSums {
         let found = self.sums(times, rows, n_step).map_err(|error| moved(error, |row| row + first));
         match found {
             Ok(levels) => {
-                let pairs = Pairs::of_block(times, rows, self.question.basis.n_channel(), n_step);
+                let Question { basis, pairs, .. } = &self.question;
+                let pairs = Pairs::of_block(times, rows, basis.n_channel(), n_step, *pairs);
                 Ok(sums_values(&levels, [times[0], times[n_step]], &pairs))
             }
             Err(error) => fault_values(&self.question, &Fault::Row(error.clone())).ok_or(error),

@@ -5,10 +5,11 @@
 //! [`super::block_sums`].
 
 use std::fs::File;
-use std::io::{Read, Seek, SeekFrom};
 use std::time::UNIX_EPOCH;
 
 use starlings_models::SumsFile;
+
+use crate::pieces::Pieces;
 
 /// Bytes that begin and end at the ends of lines.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -33,9 +34,6 @@ pub struct Part {
     pub ahead: usize,
 }
 
-/// Bytes that are read behind a part at first, for the rows beyond it.
-const BEHIND: u64 = 1 << 12;
-
 /// Length of a file and when it was last changed, nanoseconds since 1970; `None` where the system does not say.
 pub fn stamp(file: &File) -> Option<(u64, u64)> {
     let metadata = file.metadata().ok()?;
@@ -45,107 +43,124 @@ pub fn stamp(file: &File) -> Option<(u64, u64)> {
 
 /// Times, and values row after row, of those bytes; `None` where they are no plain rows or the file is another one.
 pub(crate) fn read(def: &SumsFile, bytes: Bytes) -> Option<(Vec<f64>, Vec<f64>)> {
-    let end = bytes.start.checked_add(bytes.length)?;
-    if end > def.length {
-        return None;
+    let end = bytes.start.checked_add(bytes.length).filter(|end| *end <= def.length)?;
+    let mut pieces = Pieces::new(unchanged(def)?, bytes.start, end)?;
+    let mut rows = Rows::new(def, bytes.length)?;
+    loop {
+        let piece = pieces.next()?;
+        if piece.is_empty() {
+            break;
+        }
+        rows.take_all(piece)?;
     }
-    let mut file = File::open(&def.path).ok()?;
-    let described = (def.length, def.modified);
-    if stamp(&file)? != described {
-        return None;
-    }
-    let mut text = vec![0; usize::try_from(bytes.length).ok()?];
-    file.seek(SeekFrom::Start(bytes.start)).ok()?;
-    file.read_exact(&mut text).ok()?;
-    let rows = parse(&text, def, bytes.n_row)?;
     // A file that was written to meanwhile is another one.
-    (stamp(&file)? == described).then_some(rows)
+    (stamp(pieces.file())? == (def.length, def.modified) && rows.times.len() == bytes.n_row)
+        .then_some((rows.times, rows.values))
 }
 
 /// Steps that start in a part of the file, and times and values of its rows as [`read`] gives them; `None` as there, or where no step starts
 /// in it.
 pub(crate) fn read_part(def: &SumsFile, part: Part) -> Option<(usize, Vec<f64>, Vec<f64>)> {
-    let mut file = File::open(&def.path).ok()?;
-    let described = (def.length, def.modified);
-    if stamp(&file)? != described {
-        return None;
-    }
-    let mut behind = BEHIND;
-    loop {
-        // Two bytes before it may end the line before its first row.
-        let begin = part.from.saturating_sub(2);
-        let end = part.to.saturating_add(behind).min(def.length);
-        let mut text = vec![0; usize::try_from(end.checked_sub(begin)?).ok()?];
-        file.seek(SeekFrom::Start(begin)).ok()?;
-        file.read_exact(&mut text).ok()?;
-        let Some(of) = lines_of(&text, begin, part, end == def.length) else {
-            if end == def.length {
-                return None;
+    // Two bytes before it may end the line before its first row.
+    let mut at = part.from.saturating_sub(2);
+    let mut pieces = Pieces::new(unchanged(def)?, at, def.length)?;
+    let mut rows = Rows::new(def, part.to.min(def.length).saturating_sub(part.from))?;
+    let (mut n_in, mut is_row, mut after_return) = (0, false, false);
+    let n_step = 'rows: loop {
+        let mut rest = pieces.next()?;
+        if rest.is_empty() {
+            // At the end of the file the last row ends the last step.
+            break n_in.min(rows.times.len().checked_sub(1)?);
+        }
+        if !is_row {
+            // What is before the first row ends with the line.
+            let used = memchr::memchr(b'\n', rest)? + 1;
+            (is_row, after_return) = (true, used > 1 && rest[used - 2] == b'\r');
+            (rest, at) = (&rest[used..], at + used as u64);
+        }
+        is_plain(rest)?;
+        while !rest.is_empty() {
+            let begin = at - u64::from(after_return);
+            // Rows behind the part have begun, and the last of them has ended.
+            if rows.times.len() > n_in + part.ahead {
+                break 'rows n_in;
             }
-            behind *= 8;
-            continue;
-        };
-        let (times, rows) = parse(&text[of.start..of.end], def, of.n_row)?;
-        // A file that was written to meanwhile is another one.
-        return (stamp(&file)? == described && of.n_step > 0).then_some((of.n_step, times, rows));
-    }
+            let used = if begin < part.from {
+                memchr::memchr(b'\n', rest).map_or(rest.len(), |end| end + 1)
+            } else {
+                n_in += usize::from(begin < part.to);
+                rows.take(rest)?
+            };
+            after_return = used > 1 && rest[used - 2] == b'\r';
+            (rest, at) = (&rest[used..], at + used as u64);
+        }
+    };
+    // A file that was written to meanwhile is another one.
+    (stamp(pieces.file())? == (def.length, def.modified) && n_step > 0).then_some((
+        n_step,
+        rows.times,
+        rows.values,
+    ))
 }
 
-/// The lines of a part in a text.
-struct Lines {
-    start: usize,
-    end: usize,
-    n_row: usize,
-    n_step: usize,
+/// The file, where it is still the one that was described.
+fn unchanged(def: &SumsFile) -> Option<File> {
+    let file = File::open(&def.path).ok()?;
+    (stamp(&file)? == (def.length, def.modified)).then_some(file)
 }
 
-/// Where the lines of a part are in a text that begins at a byte of the file; `None` where the text ends before they do.
-fn lines_of(text: &[u8], begin: u64, part: Part, is_end: bool) -> Option<Lines> {
-    let (mut start, mut n_row, mut n_in) = (None, 0, 0);
-    for at in memchr::memchr_iter(b'\n', text) {
-        // The line behind this end begins, as it is counted, behind the first of its bytes.
-        let after_return = at > 0 && text[at - 1] == b'\r';
-        let row = begin + at as u64 + u64::from(!after_return);
-        if row < part.from {
-            continue;
-        }
-        // Rows behind the part have begun, and this ends the last of them.
-        if n_row > n_in + part.ahead {
-            return Some(Lines { start: start?, end: at + 1, n_row, n_step: n_in });
-        }
-        if at + 1 < text.len() {
-            start.get_or_insert(at + 1);
-            n_row += 1;
-            n_in += usize::from(row < part.to);
-        }
-    }
-    if !is_end {
-        return None;
-    }
-    // At the end of the file the last row ends the last step.
-    Some(Lines { start: start?, end: text.len(), n_row, n_step: n_in.min(n_row.checked_sub(1)?) })
+/// `None` where there are quotes, in which commas and line ends mean nothing.
+fn is_plain(text: &[u8]) -> Option<()> {
+    memchr::memchr(b'"', text).is_none().then_some(())
 }
 
-/// The rows of a text.
-fn parse(text: &[u8], def: &SumsFile, n_row: usize) -> Option<(Vec<f64>, Vec<f64>)> {
-    if n_row > text.len() || memchr::memchr(b'"', text).is_some() {
-        return None;
+/// Rows that were read.
+struct Rows<'a> {
+    /// Positions of the time and of the channels.
+    time: usize,
+    channels: &'a [usize],
+    /// Which cells are read, and what is in those of a row.
+    wanted: Vec<bool>,
+    cells: Vec<f64>,
+    /// Bytes of all rows, about.
+    bytes: usize,
+    times: Vec<f64>,
+    values: Vec<f64>,
+}
+
+impl<'a> Rows<'a> {
+    fn new(def: &'a SumsFile, bytes: u64) -> Option<Self> {
+        let (time, channels) = def.cells.split_first()?;
+        let wanted: Vec<bool> = (0..def.n_cell).map(|k| def.cells.contains(&k)).collect();
+        let cells = vec![0.0; def.n_cell];
+        let (bytes, [times, values]) = (usize::try_from(bytes).ok()?, [(); 2].map(|()| Vec::new()));
+        Some(Self { time: *time, channels, wanted, cells, bytes, times, values })
     }
-    let (time, channels) = def.cells.split_first()?;
-    let wanted: Vec<bool> = (0..def.n_cell).map(|k| def.cells.contains(&k)).collect();
-    let mut values = vec![0.0; def.n_cell];
-    let mut times = Vec::with_capacity(n_row);
-    let mut rows = Vec::with_capacity(n_row.checked_mul(channels.len())?);
-    let mut rest = text;
-    while !rest.is_empty() {
-        let used = row(rest, &wanted, &mut values)?;
-        rest = &rest[used..];
-        times.push(*values.get(*time)?);
-        for at in channels {
-            rows.push(*values.get(*at)?);
+
+    /// Reads all rows of a text.
+    fn take_all(&mut self, mut text: &[u8]) -> Option<()> {
+        is_plain(text)?;
+        while !text.is_empty() {
+            text = &text[self.take(text)?..];
         }
+        Some(())
     }
-    (times.len() == n_row).then_some((times, rows))
+
+    /// Reads the first row of a text and says how many bytes it has.
+    fn take(&mut self, text: &[u8]) -> Option<usize> {
+        let used = row(text, &self.wanted, &mut self.cells)?;
+        if self.times.is_empty() {
+            // Somewhat more than there are of this length: memory that grows is taken and given back in every job.
+            let n_row = self.bytes / used * 9 / 8 + 16;
+            self.times.reserve_exact(n_row);
+            self.values.reserve_exact(n_row * self.channels.len());
+        }
+        self.times.push(*self.cells.get(self.time)?);
+        for at in self.channels {
+            self.values.push(*self.cells.get(*at)?);
+        }
+        Some(used)
+    }
 }
 
 /// Reads a row and says how many bytes it has with its line end; blanks may stand around a number. `None` where a cell that is wanted is no
@@ -188,6 +203,12 @@ mod tests {
 
     fn def(n_cell: usize, cells: &[usize]) -> SumsFile {
         SumsFile { n_cell, cells: cells.to_vec(), ..SumsFile::default() }
+    }
+
+    fn parse(text: &[u8], def: &SumsFile, n_row: usize) -> Option<(Vec<f64>, Vec<f64>)> {
+        let mut rows = Rows::new(def, text.len() as u64)?;
+        rows.take_all(text)?;
+        (rows.times.len() == n_row).then_some((rows.times, rows.values))
     }
 
     #[test]

@@ -9,6 +9,7 @@ mod block_sums;
 mod error;
 mod expressions;
 mod file_rows;
+mod pieces;
 mod question;
 
 pub use answer::{BlockAnswer, Fault, answer_of};

@@ -21,6 +21,8 @@ pub struct Question {
     pub structure: Structure,
     /// The same with a coefficient for every term that may be missing, behind the others; `None` where none is looked for.
     pub wider: Option<Structure>,
+    /// Pairs of neighbouring steps that a block gives at most.
+    pub pairs: usize,
 }
 
 impl Question {
@@ -93,7 +95,8 @@ impl Question {
             }
         }
         let wider = (!def.candidates.is_empty()).then_some(wider);
-        Ok(Self { basis: Arc::new(basis), structure, wider })
+        let pairs = def.pairs.unwrap_or(usize::MAX);
+        Ok(Self { basis: Arc::new(basis), structure, wider, pairs })
     }
 }
 

@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use starlings_proto::{INHERITED, descriptors};
+use starlings_proto::{BUILD, INHERITED, build_of_file, descriptors};
 
 use super::LocalConfig;
 use crate::FleetError;
@@ -48,6 +48,7 @@ impl Process {
         let descriptors = descriptors::offer(&own).map_err(spawn)?;
         command.args(&config.args).args(["--connect", INHERITED, "--place", &place.to_string()]);
         command.stdin(OwnedFd::from(its)).stdout(Stdio::null()).stderr(Stdio::piped());
+        command.envs(build_of_file().map(|told| (BUILD, told)));
         // A group of its own: an interrupt on the terminal reaches the coordinator only, which ends the workers in order.
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);

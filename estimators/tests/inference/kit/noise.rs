@@ -26,7 +26,8 @@ pub fn pairs_of<const N: usize>(rows: &[[f64; N]], h: f64, n_step: impl Fn(usize
     while to + 1 < rows.len() {
         let from = to;
         to = (from + n_step(from)).min(rows.len() - 1);
-        let block = Pairs::of_block(&times[from..=to], rows[from..=to].as_flattened(), N, to - from);
+        let block =
+            Pairs::of_block(&times[from..=to], rows[from..=to].as_flattened(), N, to - from, usize::MAX);
         all.merge(&block).unwrap();
     }
     all

@@ -64,6 +64,7 @@ pub(super) fn sums(source: &Source, section: &InferSection) -> SumsDef {
         left: Vec::new(),
         step: step(source, section),
         levels: if section.richardson.as_ref().is_some_and(|r| *r.get_ref()) { RICHARDSON_LEVELS } else { 1 },
+        pairs: None,
         files: Vec::new(),
         candidates: Vec::new(),
     }
