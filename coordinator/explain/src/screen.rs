@@ -17,3 +17,4 @@ pub(crate) mod resolve;
 mod response;
 pub(crate) mod screening;
 pub(crate) mod screening_result;
+mod springs;

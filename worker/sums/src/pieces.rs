@@ -6,7 +6,7 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 
 /// Bytes that are read at a time.
-const PIECE: usize = 1 << 17;
+const PIECE: usize = 1 << 16;
 /// Bytes of a line at most.
 const LONGEST: usize = 1 << 24;
 

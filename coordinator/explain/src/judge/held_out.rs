@@ -160,6 +160,13 @@ pub(crate) fn forbidding<'h>(adequacy: &Adequacy, of: &'h [HeldOut]) -> Vec<&'h 
     of.iter().filter(|h| h.fails && (strict || h.mended < SHARE_OF_EACH || far(h))).collect()
 }
 
+/// The held-out data that speak for a variant only since the uncertainty of its estimate explains what it leaves there: their error is far
+/// from the noise, and from what is left of the training rows.
+pub(crate) fn excused<'h>(adequacy: &Adequacy, of: &'h [HeldOut]) -> Vec<&'h HeldOut> {
+    let far = FAR * adequacy.rmse_over_noise.max(1.0);
+    of.iter().filter(|h| h.after > far).collect()
+}
+
 /// Those that fail, the worst first, in words; empty without any.
 pub(crate) fn listed(of: &[&HeldOut]) -> String {
     let mut worst: Vec<&&HeldOut> = of.iter().collect();
@@ -226,6 +233,13 @@ mod tests {
         let span = |before: f64| HeldOut { usage: "held-out".to_owned(), before, ..channel(17.0, 15.0, 0.9) };
         assert!(forbidding(&correlated, &[span(60.0)]).is_empty(), "something smaller remains");
         assert_eq!(forbidding(&correlated, &[span(25.0)]).len(), 1, "its uncertainty excuses what it leaves");
+    }
+
+    #[test]
+    fn what_lies_far_from_the_noise_and_from_what_was_fitted_is_only_excused() {
+        let span = [channel(9.0, 1.1, 0.99), channel(2.0, 1.1, 0.9)];
+        assert_eq!(excused(&residuals(1.2, 0.4), &span), [&span[0]]);
+        assert!(excused(&residuals(4.0, 0.4), &span).is_empty(), "as far as the training rows");
     }
 
     #[test]

@@ -6,8 +6,9 @@ use super::adequacy::{AS_STATED, Adequacy, Nature};
 use super::contribution::{SECOND_SHARE, SMALL_SHARE};
 use super::form::{Leftover, white_noise, white_share};
 use super::gates::JudgedFit;
-use super::held_out::{FAR, forbidding};
+use super::held_out::{FAR, excused, forbidding, listed};
 use super::search_result::SearchResult;
+use crate::fit::kind::Kind;
 use crate::run_cache::RunCache;
 use crate::screen::screening_result::ScreeningResult;
 
@@ -99,6 +100,14 @@ pub(crate) fn objection(
     }
     if !forbidding(&judged.adequacy, &judged.held_out).is_empty() {
         return Some(format!("`{name}` comes nearest, but what was held out still fails with it"));
+    }
+    let excused = excused(&judged.adequacy, &judged.held_out);
+    if judged.kinds().contains(&Kind::Proposal) && !excused.is_empty() {
+        return Some(format!(
+            "`{name}` comes nearest, but it was made from the training data, and where it was held against others only the uncertainty of \
+             its estimate explains what it leaves: {}",
+            listed(&excused)
+        ));
     }
     if judged.adequacy.could_be_white() {
         return leaves_most(&judged.adequacy, judged.share)

@@ -12,6 +12,7 @@ use crate::fit::kind::Kind;
 use crate::fit::same_form::same_form;
 use crate::number::three;
 use crate::options::Options;
+use crate::screen::springs::lacks_spring;
 
 /// The effects to try, those of the study first.
 ///
@@ -22,7 +23,10 @@ pub fn candidates(study: &Study, options: &Options) -> Result<Vec<EffectDef>, Ex
     let spec = bare.spec()?;
     let fitted: Vec<String> = fitted_outputs(study);
     let mut built_in = library_in(&spec, &study.time_unit);
-    built_in.retain(|effect| shows_in(effect, &spec, &fitted));
+    let given = || options.only.iter().chain(&options.without);
+    let is_named = |effect: &EffectDef| given().any(|name| names(name, &effect.name));
+    let has_place = |effect: &EffectDef| is_named(effect) || !lacks_spring(study, &spec, effect);
+    built_in.retain(|effect| shows_in(effect, &spec, &fitted) && has_place(effect));
     let all: Vec<&EffectDef> = match study.explain.library {
         Library::All => study.candidates.iter().chain(&built_in).collect(),
         Library::Study => study.candidates.iter().collect(),

@@ -5,11 +5,12 @@
 //! read: [`super::candidates`].
 
 use serde::{Deserialize, Serialize};
-use starlings_models::effect::library::{FAMILIES, shows_in};
+use starlings_models::effect::library::{FAMILIES, library_in, shows_in};
 use starlings_models::{BuildSetup, EffectDef, Quantity, Role, Setup, Spec};
 use starlings_study::{Study, checked::Library, listed};
 
 use super::candidates::fitted_outputs;
+use super::springs::lacks_spring;
 use crate::fit::candidate::Candidate;
 use crate::fit::kind::Kind;
 
@@ -46,6 +47,7 @@ pub(crate) fn not_tried(study: &Study, candidates: &[Candidate]) -> Vec<NotTried
         };
         list.push(NotTried { kind: family.name.to_owned(), reason });
     }
+    list.extend(without_spring(study, &spec, candidates));
     list.extend(untouched(&spec, candidates).into_iter().map(|(state, role)| NotTried {
         kind: format!("the equation of {state}"),
         reason: if role == Role::Other {
@@ -55,6 +57,23 @@ pub(crate) fn not_tried(study: &Study, candidates: &[Candidate]) -> Vec<NotTried
         },
     }));
     list
+}
+
+/// Effects of a spring that the model has none for.
+fn without_spring(study: &Study, spec: &Spec, candidates: &[Candidate]) -> Option<NotTried> {
+    let mut grown = library_in(spec, &study.time_unit);
+    grown.retain(|effect| {
+        lacks_spring(study, spec, effect) && candidates.iter().all(|c| c.name() != effect.name)
+    });
+    let mut rates: Vec<&str> = grown.iter().flat_map(|e| &e.adds).map(|add| add.to.as_str()).collect();
+    rates.dedup();
+    let names: Vec<&str> = grown.iter().map(|effect| effect.name.as_str()).collect();
+    let reason = format!(
+        "no displacement enters the rate of {}: the model has no spring that they could change; --only tries them all the same",
+        listed(&rates)
+    );
+    let is_left_out = !names.is_empty() && study.explain.library != Library::Study;
+    is_left_out.then(|| NotTried { kind: listed(&names), reason })
 }
 
 /// Scalar states whose rate no candidate adds to, with their role.
