@@ -99,6 +99,24 @@ fn a_windkessel_could_lack_a_series_resistance() {
 }
 
 #[test]
+fn what_changes_a_spring_is_listed_where_the_model_has_one() {
+    let dir = tempfile::tempdir().unwrap();
+    let oscillator = listed(&[study(dir.path(), "").to_str().unwrap()]);
+    let falling = listed(&[repository("examples/falling-balls/study.toml").to_str().unwrap()]);
+    let (oscillator, falling) = (names(&oscillator), names(&falling));
+    for name in ["quadratic-stiffness", "cubic-stiffness", "backlash"] {
+        assert!(
+            oscillator.contains(&name) && !falling.contains(&name),
+            "{name}: {oscillator:?}, {falling:?}"
+        );
+    }
+    assert!(
+        falling.contains(&"dead-zone") && falling.contains(&"linear-support"),
+        "they may come: {falling:?}"
+    );
+}
+
+#[test]
 fn a_study_that_is_not_there_is_wrong_input() {
     let (code, _, stderr) = output(starlings().args(["effects", "no-such.toml"]));
     assert_eq!(code, 2, "{stderr}");
