@@ -4,9 +4,7 @@ use starlings_pieces::{Folder, PieceName, SharedMemory};
 use starlings_proto::convert::floats;
 use starlings_proto::convert::lent::encode_in_memory;
 use starlings_proto::convert::piece_names::{NAMES, encode_names};
-use starlings_proto::convert::state::{
-    CHUNK_BYTES, CHUNK_VALUES, PutHead, chunk_values, encode_chunk, n_chunks,
-};
+use starlings_proto::convert::state::{CHUNK_BYTES, CHUNK_VALUES, PutHead, encode_chunk};
 use starlings_proto::generated::Chunk;
 use starlings_proto::{StateId, StateNaming, digest};
 use tokio::sync::mpsc::Sender;
@@ -69,15 +67,11 @@ pub(crate) fn read(
 
 /// Writes a state into memory that was lent.
 pub(crate) fn fill(memory: &SharedMemory, values: &[f64]) -> std::io::Result<()> {
-    let mut buffer = vec![0; CHUNK_BYTES];
-    for (index, values) in values.chunks(CHUNK_VALUES).enumerate() {
-        let bytes = &mut buffer[..8 * values.len()];
-        for (word, value) in bytes.as_chunks_mut::<8>().0.iter_mut().zip(values) {
-            *word = value.to_le_bytes();
-        }
-        memory.write(bytes, index * CHUNK_BYTES)?;
+    if cfg!(target_endian = "little") {
+        return memory.write(bytemuck::cast_slice(values), 0);
     }
-    Ok(())
+    let mut pieces = values.chunks(CHUNK_VALUES).enumerate();
+    pieces.try_for_each(|(index, values)| memory.write(&floats::encode(values), index * CHUNK_BYTES))
 }
 
 /// Says that a state stands in the memory that was lent under this number.
@@ -86,19 +80,14 @@ pub(crate) fn send_in_memory(pieces: &Sender<Chunk>, head: PutHead, number: u64)
     let _ = pieces.blocking_send(head.encode()).and_then(|()| pieces.blocking_send(encode_in_memory(number)));
 }
 
-/// Reads a state of so many values from memory that nobody changes into memory of its own, which is empty: its name, and its values.
-pub(crate) fn copy(
-    memory: &SharedMemory,
-    n_state: usize,
-    mut values: Vec<f64>,
-) -> std::io::Result<(StateId, Vec<f64>)> {
-    let mut naming = StateNaming::of(n_state);
-    let mut buffer = vec![0; CHUNK_BYTES];
-    for index in 0..n_chunks(n_state) {
-        let bytes = &mut buffer[..8 * chunk_values(n_state, index)];
-        memory.read(bytes, index * CHUNK_BYTES)?;
-        naming.piece(&digest(bytes));
-        values.extend(bytes.as_chunks::<8>().0.iter().map(|word| f64::from_le_bytes(*word)));
+/// Reads a state of so many values from memory that nobody changes into memory of its own, whatever is in that.
+pub(crate) fn copy(memory: &SharedMemory, n_state: usize, mut values: Vec<f64>) -> std::io::Result<Vec<f64>> {
+    values.resize(n_state, 0.0);
+    memory.read(bytemuck::cast_slice_mut(&mut values), 0)?;
+    if cfg!(target_endian = "big") {
+        for value in &mut values {
+            *value = f64::from_bits(value.to_bits().swap_bytes());
+        }
     }
-    Ok((naming.finish(), values))
+    Ok(values)
 }

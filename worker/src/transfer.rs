@@ -9,7 +9,7 @@ mod incoming;
 mod lent;
 
 use std::ops::Deref;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
 use starlings_models::ParticleError;
@@ -55,6 +55,8 @@ pub(crate) struct Session {
     descriptors: Option<Arc<DescriptorReceiver>>,
     /// Memory that the coordinator lent and nobody writes now.
     lent: Mutex<Vec<LentMemory>>,
+    /// States that were read from memory of the coordinator.
+    read: AtomicU64,
     /// Whether it was told that the folder refuses.
     is_told: AtomicBool,
 }
@@ -86,6 +88,7 @@ impl Transfers {
             shared,
             descriptors,
             lent: Mutex::default(),
+            read: AtomicU64::new(0),
             is_told: AtomicBool::new(false),
         }))
     }
