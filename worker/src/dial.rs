@@ -155,7 +155,8 @@ async fn attach(way: &Way, hello: Hello, states: Option<&PlaceName>) -> Result<C
             if folder.is_some() {
                 outbox.send(FromWorker::SharesStates);
             }
-            let transfers = Transfers::new(client, (welcome.epoch, nonce), folder, way.descriptors());
+            let safely = (way.descriptors(), way.is_safe());
+            let transfers = Transfers::new(client, (welcome.epoch, nonce), folder, safely);
             Ok(Connection { address, welcome, outbox, inbound, windows, transfers, sharing })
         }
         Some(Ok(ToWorker::Refuse(reason))) => Err(Attempt::Refused(reason)),

@@ -9,29 +9,49 @@ use starlings_proto::generated::Chunk;
 use starlings_proto::{StateId, StateNaming, digest};
 use tokio::sync::mpsc::Sender;
 
-/// Sends a state piece by piece; its name, unless the stream ended before it.
-pub(crate) fn send(pieces: &Sender<Chunk>, head: PutHead, values: &[f64]) -> Option<StateId> {
-    let mut naming = StateNaming::of(values.len());
-    pieces.blocking_send(head.encode()).ok()?;
-    for piece in values.chunks(CHUNK_VALUES) {
-        let bytes = floats::encode(piece);
-        naming.piece(&digest(&bytes));
-        pieces.blocking_send(encode_chunk(bytes)).ok()?;
-    }
-    Some(naming.finish())
+/// What was sent.
+pub(crate) enum Sent {
+    /// A state of this name.
+    Named(StateId),
+    /// A state that was not named here.
+    Unnamed,
+    /// Not all of it: the stream ended before.
+    Ended,
 }
 
-/// Sends the names of the pieces of a state; its own name, unless the stream ended before it.
-pub(crate) fn send_names(pieces: &Sender<Chunk>, head: PutHead, names: &[PieceName]) -> Option<StateId> {
+/// Sends a state piece by piece, and names it where it is to be compared.
+pub(crate) fn send(pieces: &Sender<Chunk>, head: PutHead, (values, compares): (&[f64], bool)) -> Sent {
+    let mut naming = compares.then(|| StateNaming::of(values.len()));
+    if pieces.blocking_send(head.encode()).is_err() {
+        return Sent::Ended;
+    }
+    for piece in values.chunks(CHUNK_VALUES) {
+        let bytes = floats::encode(piece);
+        if let Some(naming) = &mut naming {
+            naming.piece(&digest(&bytes));
+        }
+        if pieces.blocking_send(encode_chunk(bytes)).is_err() {
+            return Sent::Ended;
+        }
+    }
+    naming.map_or(Sent::Unnamed, |naming| Sent::Named(naming.finish()))
+}
+
+/// Sends the names of the pieces of a state, and names it by them.
+pub(crate) fn send_names(pieces: &Sender<Chunk>, head: PutHead, names: &[PieceName]) -> Sent {
     let mut naming = StateNaming::of(head.n_state);
-    pieces.blocking_send(head.encode()).ok()?;
+    if pieces.blocking_send(head.encode()).is_err() {
+        return Sent::Ended;
+    }
     for names in names.chunks(NAMES) {
         for name in names {
             naming.piece(name);
         }
-        pieces.blocking_send(encode_names(names)).ok()?;
+        if pieces.blocking_send(encode_names(names)).is_err() {
+            return Sent::Ended;
+        }
     }
-    Some(naming.finish())
+    Sent::Named(naming.finish())
 }
 
 /// Writes a state into the folder, of which nobody else looks at the values: the names of its pieces.

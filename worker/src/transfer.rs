@@ -27,13 +27,17 @@ use tonic::{Status, Streaming};
 
 pub(crate) use incoming::Incoming;
 
-use crate::pieces;
+use crate::pieces::{self, Sent};
 use crate::spare::Spare;
 use crate::way::Proven;
 use lent::LentMemory;
 
 /// States that are sent at the same time: what they leave of the connection's window is for the messages.
 const LANES: usize = 2;
+
+/// Of the states on a way on which nothing is damaged, the first one and one in so many are compared with their names, which takes as long as to
+/// seal them.
+const COMPARED: u64 = 64;
 
 /// Pieces made ahead of what the network has taken.
 const AHEAD: usize = 4;
@@ -55,8 +59,10 @@ pub(crate) struct Session {
     descriptors: Option<Arc<DescriptorReceiver>>,
     /// Memory that the coordinator lent and nobody writes now.
     lent: Mutex<Vec<LentMemory>>,
-    /// States that were read from memory of the coordinator.
-    read: AtomicU64,
+    /// Whether what travels on this way arrives as it was sent.
+    is_safe: bool,
+    /// States that went on such a way.
+    went: AtomicU64,
     /// Whether it was told that the folder refuses.
     is_told: AtomicBool,
 }
@@ -75,7 +81,7 @@ impl Transfers {
         client: FleetClient<Proven>,
         (epoch, nonce): (u64, u64),
         shared: Option<Arc<Folder>>,
-        descriptors: Option<Arc<DescriptorReceiver>>,
+        (descriptors, is_safe): (Option<Arc<DescriptorReceiver>>, bool),
     ) -> Self {
         Self(Arc::new(Session {
             client,
@@ -88,7 +94,8 @@ impl Transfers {
             shared,
             descriptors,
             lent: Mutex::default(),
-            read: AtomicU64::new(0),
+            is_safe,
+            went: AtomicU64::new(0),
             is_told: AtomicBool::new(false),
         }))
     }
@@ -100,6 +107,11 @@ impl Transfers {
         } else {
             tracing::warn!("states go over the connection where the shared folder refuses: {reason}");
         }
+    }
+
+    /// Whether the next state is compared with its name.
+    fn compares(&self) -> bool {
+        !self.is_safe || self.went.fetch_add(1, Ordering::Relaxed).is_multiple_of(COMPARED)
     }
 
     /// The folder of states that the coordinator sees too.
@@ -116,7 +128,7 @@ impl Transfers {
     #[cfg(test)]
     pub(crate) fn nowhere(runtime: &Handle) -> Self {
         let _inside = runtime.enter();
-        Self::new(FleetClient::new(crate::way::nowhere()), (1, 1), None, None)
+        Self::new(FleetClient::new(crate::way::nowhere()), (1, 1), None, (None, false))
     }
 
     /// Asks for a state; its values come when they are read.
@@ -160,17 +172,19 @@ impl Transfers {
         if let Some(taken) = by_memory {
             return taken.map_err(|status| not_taken(&status_text(&status)));
         }
-        let sent = self.send(|pieces| pieces::send(&pieces, head, values));
+        let compares = self.compares();
+        let sent = self.send(|pieces| pieces::send(&pieces, head, (values, compares)));
         sent.map_err(|reason| not_taken(&reason))
     }
 
-    /// Puts what `send` says, which returns the name that the coordinator must answer with.
-    fn send(
-        &self,
-        send: impl FnOnce(mpsc::Sender<generated::Chunk>) -> Option<StateId>,
-    ) -> Result<StateId, String> {
-        let (taken, name) = self.arrived(send).map_err(|status| status_text(&status))?;
-        if Some(taken) == name { Ok(taken) } else { Err("another one arrived than was sent".to_owned()) }
+    /// Puts what `send` says, which returns the name that the coordinator must answer with, if it is to be compared.
+    fn send(&self, send: impl FnOnce(mpsc::Sender<generated::Chunk>) -> Sent) -> Result<StateId, String> {
+        let (taken, sent) = self.arrived(send).map_err(|status| status_text(&status))?;
+        match sent {
+            Sent::Unnamed => Ok(taken),
+            Sent::Named(name) if name == taken => Ok(taken),
+            Sent::Named(_) | Sent::Ended => Err("another one arrived than was sent".to_owned()),
+        }
     }
 
     /// Puts what `send` says: the name of what arrived, and what `send` returned.

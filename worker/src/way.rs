@@ -137,6 +137,11 @@ impl Way {
         if let Self::Inherited(_, _, descriptors) = self { descriptors.clone() } else { None }
     }
 
+    /// Whether what travels on it arrives as it was sent: inside TLS, which proves every record, or inside this machine.
+    pub(crate) fn is_safe(&self) -> bool {
+        !matches!(self, Self::Plain { .. })
+    }
+
     pub(crate) fn is_inherited(&self) -> bool {
         matches!(self, Self::Inherited(..))
     }
