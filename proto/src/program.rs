@@ -12,18 +12,27 @@ pub const BUILD: &str = "STARLINGS_BUILD";
 
 /// BLAKE3 of the running program; `None` when it cannot be read.
 pub fn own_build() -> Option<[u8; 32]> {
-    static OWN: OnceLock<Option<[u8; 32]>> = OnceLock::new();
-    *OWN.get_or_init(|| {
-        let file = running().ok()?;
-        let told = std::env::var(BUILD).ok();
-        told.and_then(|told| known(&told, &of_file(&file)?)).or_else(|| hash(file))
-    })
+    Some(own()?.1)
 }
 
-/// The file of the running program and its BLAKE3, for the environment of processes that are to run it; `None` when it cannot be read.
+/// The file of the running program, as it was when it was read, and its BLAKE3, for the environment of processes that are to run it; `None` when it
+/// cannot be read.
 pub fn build_of_file() -> Option<String> {
-    let build = own_build()?;
-    Some(format!("{} {}", of_file(&running().ok()?)?, blake3::Hash::from_bytes(build).to_hex()))
+    let (file, build) = own()?;
+    Some(format!("{file} {}", blake3::Hash::from_bytes(*build).to_hex()))
+}
+
+/// The file of the running program, and its BLAKE3.
+fn own() -> Option<&'static (String, [u8; 32])> {
+    static OWN: OnceLock<Option<(String, [u8; 32])>> = OnceLock::new();
+    let found = OWN.get_or_init(|| {
+        let file = running().ok()?;
+        // Before it is read: what is written to it meanwhile makes another file of it.
+        let is = of_file(&file)?;
+        let told = std::env::var(BUILD).ok().and_then(|told| known(&told, &is));
+        Some((is, told.or_else(|| hash(file))?))
+    });
+    found.as_ref()
 }
 
 /// The file that this process runs, also after another was put in its place.
@@ -31,7 +40,7 @@ fn running() -> std::io::Result<File> {
     File::open("/proc/self/exe").or_else(|_| File::open(std::env::current_exe()?))
 }
 
-/// Which file it is, unchanged: nothing writes to a program that runs.
+/// Which file it is, and since when it is as it is.
 fn of_file(file: &File) -> Option<String> {
     let is = file.metadata().ok()?;
     Some(format!("{}:{}:{}:{}.{:09}", is.dev(), is.ino(), is.size(), is.mtime(), is.mtime_nsec()))

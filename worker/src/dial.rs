@@ -13,7 +13,7 @@ use crate::held::Run;
 use crate::news::News;
 use crate::outbox::Outbox;
 use crate::patience::Patience;
-use crate::transfer::Transfers;
+use crate::transfer::{Compared, Transfers};
 use crate::way::{ATTEMPT, NoWay, Way};
 use crate::{WorkerConfig, WorkerError, shared};
 
@@ -155,8 +155,8 @@ async fn attach(way: &Way, hello: Hello, states: Option<&PlaceName>) -> Result<C
             if folder.is_some() {
                 outbox.send(FromWorker::SharesStates);
             }
-            let safely = (way.descriptors(), way.is_safe());
-            let transfers = Transfers::new(client, (welcome.epoch, nonce), folder, safely);
+            let beside = (way.descriptors(), Compared::new(way.is_safe()));
+            let transfers = Transfers::new(client, (welcome.epoch, nonce), folder, beside);
             Ok(Connection { address, welcome, outbox, inbound, windows, transfers, sharing })
         }
         Some(Ok(ToWorker::Refuse(reason))) => Err(Attempt::Refused(reason)),

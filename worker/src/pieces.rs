@@ -20,8 +20,8 @@ pub(crate) enum Sent {
 }
 
 /// Sends a state piece by piece, and names it where it is to be compared.
-pub(crate) fn send(pieces: &Sender<Chunk>, head: PutHead, (values, compares): (&[f64], bool)) -> Sent {
-    let mut naming = compares.then(|| StateNaming::of(values.len()));
+pub(crate) fn send(pieces: &Sender<Chunk>, head: PutHead, values: &[f64], is_compared: bool) -> Sent {
+    let mut naming = is_compared.then(|| StateNaming::of(values.len()));
     if pieces.blocking_send(head.encode()).is_err() {
         return Sent::Ended;
     }

@@ -5,11 +5,12 @@
 //! Next files to read: `incoming`, for what
 //! comes; `lent`, for what goes by memory; `inbox`, for when states are asked for.
 
+mod compared;
 mod incoming;
 mod lent;
 
 use std::ops::Deref;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
 use starlings_models::ParticleError;
@@ -30,14 +31,11 @@ pub(crate) use incoming::Incoming;
 use crate::pieces::{self, Sent};
 use crate::spare::Spare;
 use crate::way::Proven;
+pub(crate) use compared::Compared;
 use lent::LentMemory;
 
 /// States that are sent at the same time: what they leave of the connection's window is for the messages.
 const LANES: usize = 2;
-
-/// Of the states on a way on which nothing is damaged, the first one and one in so many are compared with their names, which takes as long as to
-/// seal them.
-const COMPARED: u64 = 64;
 
 /// Pieces made ahead of what the network has taken.
 const AHEAD: usize = 4;
@@ -59,10 +57,7 @@ pub(crate) struct Session {
     descriptors: Option<Arc<DescriptorReceiver>>,
     /// Memory that the coordinator lent and nobody writes now.
     lent: Mutex<Vec<LentMemory>>,
-    /// Whether what travels on this way arrives as it was sent.
-    is_safe: bool,
-    /// States that went on such a way.
-    went: AtomicU64,
+    compared: Compared,
     /// Whether it was told that the folder refuses.
     is_told: AtomicBool,
 }
@@ -81,7 +76,7 @@ impl Transfers {
         client: FleetClient<Proven>,
         (epoch, nonce): (u64, u64),
         shared: Option<Arc<Folder>>,
-        (descriptors, is_safe): (Option<Arc<DescriptorReceiver>>, bool),
+        (descriptors, compared): (Option<Arc<DescriptorReceiver>>, Compared),
     ) -> Self {
         Self(Arc::new(Session {
             client,
@@ -94,8 +89,7 @@ impl Transfers {
             shared,
             descriptors,
             lent: Mutex::default(),
-            is_safe,
-            went: AtomicU64::new(0),
+            compared,
             is_told: AtomicBool::new(false),
         }))
     }
@@ -107,11 +101,6 @@ impl Transfers {
         } else {
             tracing::warn!("states go over the connection where the shared folder refuses: {reason}");
         }
-    }
-
-    /// Whether the next state is compared with its name.
-    fn compares(&self) -> bool {
-        !self.is_safe || self.went.fetch_add(1, Ordering::Relaxed).is_multiple_of(COMPARED)
     }
 
     /// The folder of states that the coordinator sees too.
@@ -128,7 +117,7 @@ impl Transfers {
     #[cfg(test)]
     pub(crate) fn nowhere(runtime: &Handle) -> Self {
         let _inside = runtime.enter();
-        Self::new(FleetClient::new(crate::way::nowhere()), (1, 1), None, (None, false))
+        Self::new(FleetClient::new(crate::way::nowhere()), (1, 1), None, (None, Compared::new(false)))
     }
 
     /// Asks for a state; its values come when they are read.
@@ -172,8 +161,8 @@ impl Transfers {
         if let Some(taken) = by_memory {
             return taken.map_err(|status| not_taken(&status_text(&status)));
         }
-        let compares = self.compares();
-        let sent = self.send(|pieces| pieces::send(&pieces, head, (values, compares)));
+        let is_compared = self.compared.goes();
+        let sent = self.send(|pieces| pieces::send(&pieces, head, values, is_compared));
         sent.map_err(|reason| not_taken(&reason))
     }
 

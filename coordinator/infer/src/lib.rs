@@ -46,6 +46,7 @@ mod resampled;
 pub mod result;
 mod rows;
 pub mod run;
+mod share;
 mod smoothed;
 mod varying;
 mod words;

@@ -2,7 +2,7 @@
 //!
 //! Next file to read: `gather.rs`.
 
-use starlings_estimators::inference::{Fit, Pairs, Sums};
+use starlings_estimators::inference::{Fit, Sums};
 use starlings_fleet::Fleet;
 use starlings_models::Setup;
 use starlings_study::Study;
@@ -10,14 +10,13 @@ use starlings_study::infer_choice::{InferChoice, InferRecord, MeasuredChoice};
 use starlings_sums::Question;
 
 use crate::answer::{Answer, fit};
-use crate::blocks::{Cut, Start, length, start};
+use crate::blocks::{Cut, Start, start};
 use crate::convergence::Convergence;
 use crate::doubts::Doubts;
 use crate::error::InferError;
 use crate::file_blocks::files;
 use crate::gather::{Gathered, Source, Work};
 use crate::missing::Wider;
-use crate::parts::Parts;
 use crate::progress::{Progress, Teller};
 use crate::reduced::{check_reduced, fit_reduced};
 use crate::result::{Converging, Inference, MissingFound, RecordUsed};
@@ -37,17 +36,6 @@ pub(crate) struct Asked<'a> {
     pub(crate) setup: Setup,
     pub(crate) question: Question,
     pub(crate) fit: Fit,
-}
-
-impl Asked<'_> {
-    /// Has each of so many blocks give its share of the pairs that are kept: more would be sent and thrown away.
-    fn share_pairs(&mut self, n_block: u64) {
-        let share = Pairs::share(self.question.basis.n_channel(), n_block);
-        self.question.pairs = share;
-        if let Some(sums) = &mut self.setup.sums {
-            sums.pairs = Some(share);
-        }
-    }
 }
 
 /// Who reads the recordings.
@@ -77,9 +65,7 @@ pub fn infer(
     let at = start(first)?;
     let mut asked = asked(study, choice, at.step)?;
     let cut = cut(choice, &asked, at);
-    if let Some(bytes) = cut.bytes {
-        asked.share_pairs(choice.records.iter().map(|record| Parts::new(0, length(record), bytes).n).sum());
-    }
+    asked.share_pairs(&choice.records, cut);
     let mut teller = Teller::new(choice, cut, at, watch);
     let (gathered, convergence) = gathered(&asked, &choice.records, cut, fleet, (reader, &mut teller))?;
     let structure = &asked.question.structure;

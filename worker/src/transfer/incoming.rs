@@ -65,7 +65,7 @@ impl Incoming {
             return self.in_pieces().await;
         };
         let (n_state, values) = (self.n_state, self.room()?);
-        let is_compared = self.way.compares();
+        let is_compared = self.way.compared.comes();
         let read = tokio::task::spawn_blocking(move || {
             let memory = SharedMemory::received(descriptor, n_state * 8, true)?;
             let values = pieces::copy(&memory, n_state, values)?;
@@ -117,7 +117,7 @@ impl Incoming {
         let n_state = self.n_state;
         let mut values = self.room()?;
         values.clear();
-        let mut naming = self.way.compares().then(|| StateNaming::of(n_state));
+        let mut naming = self.way.compared.comes().then(|| StateNaming::of(n_state));
         for index in 0..n_chunks(n_state) {
             let message = match first.take() {
                 Some(message) => message,

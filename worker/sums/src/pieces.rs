@@ -13,7 +13,7 @@ const LONGEST: usize = 1 << 24;
 /// Bytes of a file from a place on, in pieces that end where a line does.
 pub(crate) struct Pieces {
     file: File,
-    /// What was read; the first `held` of them are no longer than that, and those before `from` were given.
+    /// Its first `held` bytes are of the file; those before `from` were given out.
     text: Vec<u8>,
     from: usize,
     held: usize,

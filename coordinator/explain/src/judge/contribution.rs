@@ -123,6 +123,7 @@ mod tests {
             beyond: 1.0,
             fails,
             mended: 1.0,
+            noise: 1.0,
         };
         let (white, known) = (0.4, f64::INFINITY);
         assert!(is_noise(&left(1.01, white, known), &[held_out(false)]));

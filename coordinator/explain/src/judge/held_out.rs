@@ -56,6 +56,8 @@ pub struct HeldOut {
     pub fails: bool,
     /// Share of the excess χ² that went away, with what the uncertainty of the estimate explains; 0 where there was no excess.
     pub mended: f64,
+    /// The noise with which these data are compared, over the stated one.
+    pub noise: f64,
 }
 
 impl HeldOut {
@@ -110,6 +112,7 @@ pub(crate) fn held_out(
             beyond: beyond.sqrt(),
             fails: is_larger(beyond, at.len(), row.noise_freedom) && is - explained > FIRST_ORDER * explained,
             mended: if was > n { ((was - is + explained) / (was - n)).clamp(-1.0, 1.0) } else { 0.0 },
+            noise: levels[row.output].sqrt(),
         }
     };
     groups(&rows.rows).into_iter().map(one).collect()
@@ -160,11 +163,11 @@ pub(crate) fn forbidding<'h>(adequacy: &Adequacy, of: &'h [HeldOut]) -> Vec<&'h 
     of.iter().filter(|h| h.fails && (strict || h.mended < SHARE_OF_EACH || far(h))).collect()
 }
 
-/// The held-out data that speak for a variant only since the uncertainty of its estimate explains what it leaves there: their error is far
-/// from the noise, and from what is left of the training rows.
-pub(crate) fn excused<'h>(adequacy: &Adequacy, of: &'h [HeldOut]) -> Vec<&'h HeldOut> {
-    let far = FAR * adequacy.rmse_over_noise.max(1.0);
-    of.iter().filter(|h| h.after > far).collect()
+/// The held-out data that do not speak for a variant, whatever the uncertainty of its estimate explains: their error is far from the noise, and
+/// from what is left of the training rows where that is no noise.
+pub(crate) fn far_off<'h>(adequacy: &Adequacy, of: &'h [HeldOut]) -> Vec<&'h HeldOut> {
+    let left = if adequacy.could_be_white() { 1.0 } else { adequacy.rmse_over_noise };
+    of.iter().filter(|h| h.after > FAR * h.noise.max(left)).collect()
 }
 
 /// Those that fail, the worst first, in words; empty without any.
@@ -194,6 +197,7 @@ mod tests {
             beyond,
             fails: beyond > FAILS,
             mended,
+            noise: 1.0,
         }
     }
 
@@ -236,10 +240,12 @@ mod tests {
     }
 
     #[test]
-    fn what_lies_far_from_the_noise_and_from_what_was_fitted_is_only_excused() {
+    fn what_lies_far_from_the_noise_and_from_what_was_fitted_does_not_speak_for_a_variant() {
         let span = [channel(9.0, 1.1, 0.99), channel(2.0, 1.1, 0.9)];
-        assert_eq!(excused(&residuals(1.2, 0.4), &span), [&span[0]]);
-        assert!(excused(&residuals(4.0, 0.4), &span).is_empty(), "as far as the training rows");
+        assert_eq!(far_off(&residuals(1.2, 0.4), &span), [&span[0]]);
+        assert!(far_off(&residuals(4.0, 1e-9), &span).is_empty(), "as far as the training rows");
+        let noisy = [HeldOut { noise: 4.0, ..channel(9.0, 1.1, 0.99) }];
+        assert!(far_off(&residuals(1.2, 0.4), &noisy).is_empty(), "an output noisier than stated");
     }
 
     #[test]

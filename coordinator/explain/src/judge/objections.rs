@@ -6,7 +6,7 @@ use super::adequacy::{AS_STATED, Adequacy, Nature};
 use super::contribution::{SECOND_SHARE, SMALL_SHARE};
 use super::form::{Leftover, white_noise, white_share};
 use super::gates::JudgedFit;
-use super::held_out::{FAR, excused, forbidding, listed};
+use super::held_out::{FAR, far_off, forbidding, listed};
 use super::search_result::SearchResult;
 use crate::fit::kind::Kind;
 use crate::run_cache::RunCache;
@@ -101,12 +101,12 @@ pub(crate) fn objection(
     if !forbidding(&judged.adequacy, &judged.held_out).is_empty() {
         return Some(format!("`{name}` comes nearest, but what was held out still fails with it"));
     }
-    let excused = excused(&judged.adequacy, &judged.held_out);
-    if judged.kinds().contains(&Kind::Proposal) && !excused.is_empty() {
+    let far_off = far_off(&judged.adequacy, &judged.held_out);
+    if judged.kinds().contains(&Kind::Proposal) && !far_off.is_empty() {
         return Some(format!(
-            "`{name}` comes nearest, but it was made from the training data, and where it was held against others only the uncertainty of \
-             its estimate explains what it leaves: {}",
-            listed(&excused)
+            "`{name}` comes nearest, but it was made from the training data, and others do not speak for it, whatever the uncertainty of \
+             its estimate explains: {}",
+            listed(&far_off)
         ));
     }
     if judged.adequacy.could_be_white() {

@@ -66,10 +66,11 @@ fn without_spring(study: &Study, spec: &Spec, candidates: &[Candidate]) -> Optio
         lacks_spring(study, spec, effect) && candidates.iter().all(|c| c.name() != effect.name)
     });
     let mut rates: Vec<&str> = grown.iter().flat_map(|e| &e.adds).map(|add| add.to.as_str()).collect();
+    rates.sort_unstable();
     rates.dedup();
     let names: Vec<&str> = grown.iter().map(|effect| effect.name.as_str()).collect();
     let reason = format!(
-        "no displacement enters the rate of {}: the model has no spring that they could change; --only tries them all the same",
+        "no displacement enters the rate of {}: the model has no spring that they could change; --only with the name of one tries it all the same",
         listed(&rates)
     );
     let is_left_out = !names.is_empty() && study.explain.library != Library::Study;

@@ -161,6 +161,7 @@ fn held_out() -> Vec<HeldOut> {
         beyond: 0.9 * after,
         fails: after > 2.0,
         mended: 0.7,
+        noise: 1.0,
     };
     vec![of("pressure", "held-out", 2.46), of("inlet", "held-out-channel", 1.02)]
 }
