@@ -8,7 +8,7 @@ mod infer_kit;
 use std::fmt::Write as _;
 use std::fs;
 
-use infer_kit::{STUDY, coupled, folder, followed, infer, recording};
+use infer_kit::{STUDY, coupled, folder, followed, infer, noise, recording};
 use serde_json::Value;
 
 #[test]
@@ -174,6 +174,24 @@ fn a_stream_with_errors_of_the_measurement_has_the_noise_of_the_whole_inference(
             assert!((one / other - 1.0).abs() < 1e-6, "{word}: {one} and {other}");
         }
     }
+}
+
+#[test]
+fn a_stream_with_errors_of_the_measurement_has_no_test_and_says_why() {
+    let (mut noise, mut data) = (noise(3), "time,x,z\n".to_owned());
+    for line in recording(4_000, usize::MAX).lines().skip(1) {
+        let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
+        let [x, z] = [cells[1] + 0.1 * noise(), cells[2] + 0.1 * noise()];
+        writeln!(data, "{:?},{x:?},{z:?}", cells[0]).unwrap();
+    }
+    let dir = folder(STUDY, "");
+    let (code, lines, stderr) = followed(dir.path(), &data, &[]);
+    assert_eq!(code, 0, "{stderr}");
+    assert_eq!(stderr.matches("no test of a change: errors of the measurement matter").count(), 1, "{stderr}");
+    let lines: Vec<Value> = lines.iter().map(|line| serde_json::from_str(line).unwrap()).collect();
+    assert_eq!(lines.len(), 20);
+    assert!(lines.iter().all(|line| line["alarm"] == false && line["test"].is_null()), "{lines:?}");
+    assert!(!lines[19]["coefficients"].is_null(), "estimates go on: {}", lines[19]);
 }
 
 #[test]

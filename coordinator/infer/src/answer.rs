@@ -4,8 +4,8 @@
 
 use nalgebra::{DMatrix, DVector};
 use starlings_estimators::inference::{
-    Basis, Diffusion, Estimate, Extrapolated, Fit, InferenceError, NoiseCheck, Posterior, Prior, Strength,
-    Structure, Sums, extrapolate,
+    Basis, Diffusion, Estimate, Extrapolated, Fit, InferenceError, NoiseCheck, NoiseForm, Posterior, Prior,
+    Strength, Structure, Sums, extrapolate,
 };
 use starlings_study::infer_choice::{DiffusionChoice, InferChoice, MeasuredChoice};
 
@@ -72,6 +72,10 @@ pub(crate) struct Answer {
     pub(crate) checks: Vec<NoiseCheck>,
     /// Whether errors of the measurement were taken out of the noise.
     pub(crate) lag_corrected: bool,
+    /// Whether V counts with all that the residuals share.
+    pub(crate) whole_in_jacobian: bool,
+    /// In what the noise has not the form that the study holds it to have.
+    pub(crate) departs: Vec<NoiseForm>,
     pub(crate) extrapolated: Option<Extrapolated>,
     /// What went less well than was asked for.
     pub(crate) doubts: Vec<String>,
@@ -99,14 +103,30 @@ impl Answer {
             return Err(InferError::Setting("no block of any recording was summed".to_owned()));
         };
         let fitted = Fitted::of(choice, fit, structure, sums, Given::Recording(basis, pairs));
-        let Fitted { posterior, checks, lag_corrected } =
+        let Fitted { posterior, checks, departs, fit } =
             fitted.map_err(|error| hidden::told(error, sums, structure))?;
-        let fit = Fit { lag_corrected, ..fit.clone() };
         let (extrapolated, doubts) = match to_no_step(&fit, structure, &posterior, &levels[1..]) {
             Ok(extrapolated) => (extrapolated, Vec::new()),
             Err(doubt) => (None, vec![doubt]),
         };
-        Ok(Self { posterior, checks, lag_corrected, extrapolated, doubts, constant: None })
+        let Fit { lag_corrected, whole_in_jacobian, .. } = fit;
+        let constant = None;
+        Ok(Self {
+            posterior,
+            checks,
+            lag_corrected,
+            whole_in_jacobian,
+            departs,
+            extrapolated,
+            doubts,
+            constant,
+        })
+    }
+
+    /// The fit by which it was made.
+    pub(crate) fn fit(&self, asked: &Fit) -> Fit {
+        let Self { lag_corrected, whole_in_jacobian, .. } = *self;
+        Fit { lag_corrected, whole_in_jacobian, ..asked.clone() }
     }
 
     /// The posterior from a smoothed path, where the standard deviation of the measurement is known. The recording as it was measured
@@ -133,7 +153,16 @@ impl Answer {
         let found = smoothed(question, fit, &choice.records, cut, sd, teller)?;
         let doubts = not_converged(found.converged, found.log_likelihood.len()).into_iter().collect();
         let posterior = found.posterior;
-        Ok(Self { posterior, checks, lag_corrected: false, extrapolated: None, doubts, constant: None })
+        Ok(Self {
+            posterior,
+            checks,
+            lag_corrected: false,
+            whole_in_jacobian: false,
+            departs: Vec::new(),
+            extrapolated: None,
+            doubts,
+            constant: None,
+        })
     }
 
     /// Takes a posterior that holds for noise of any size, told from so many of all steps.

@@ -10,6 +10,7 @@ use starlings_study::infer_choice::MeasuredChoice;
 use crate::answer::Answer;
 use crate::blocks::{Blocks, Cut, Start, open};
 use crate::error::InferError;
+use crate::noise_words::alike;
 use crate::result::LEVEL;
 use crate::run::Asked;
 
@@ -35,7 +36,7 @@ pub(crate) enum Coarse {
     Fast(f64),
 }
 
-/// Looks whether steps are coarse; `None` where they are not, where errors of the measurement or an interpolation hide it, or where the study
+/// Looks whether steps are coarse; `None` where they are not, where errors of the measurement, a memory of the noise or an interpolation hide it, or where the study
 /// extrapolates.
 pub(crate) fn coarse(
     asked: &Asked<'_>,
@@ -48,6 +49,7 @@ pub(crate) fn coarse(
     let choice = asked.choice;
     let is_noisy =
         answer.lag_corrected || answer.checks.iter().any(|check| check.verdict == Verdict::Matters);
+    let is_noisy = is_noisy || !alike(&answer.checks, &asked.question.structure).is_empty();
     let is_known = matches!(choice.measured, MeasuredChoice::Known(_));
     if choice.sums.levels > 1 || choice.resample || is_known || is_noisy {
         return None;

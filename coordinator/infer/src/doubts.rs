@@ -2,7 +2,7 @@
 //!
 //! Next files to read: `coarse.rs`, `varying.rs`, `constancy.rs`.
 
-use starlings_estimators::inference::Fit;
+use starlings_estimators::inference::{Fit, NoiseCheck};
 use starlings_study::infer_choice::{InferChoice, MeasuredChoice};
 
 use crate::answer::Answer;
@@ -13,13 +13,17 @@ use crate::gather::Gathered;
 use crate::result::NoiseVaries;
 use crate::run::Asked;
 use crate::varying::{said, varies};
-use crate::words;
+use crate::{noise_words, words};
 
 /// What was found.
 pub(crate) struct Doubts {
     coarse: Option<Coarse>,
     pub(crate) varies: Vec<NoiseVaries>,
     changed: Option<Changed>,
+    /// Equations in which neighbouring residuals are alike.
+    alike: Vec<NoiseCheck>,
+    /// What is said of errors of the measurement that are given.
+    given: Option<String>,
 }
 
 impl Doubts {
@@ -34,13 +38,25 @@ impl Doubts {
         let (choice, structure) = (asked.choice, &asked.question.structure);
         let coarse = gathered.levels.first().and_then(|sums| coarse(asked, fit, answer, sums, cut, at));
         let varies = varies(asked, fit, answer, gathered, coarse.is_some());
+        let alike: Vec<NoiseCheck> = match choice.resample {
+            // What an interpolation leaves in neighbouring residuals is taken out.
+            true => Vec::new(),
+            false => noise_words::alike(&answer.checks, structure).into_iter().cloned().collect(),
+        };
+        let given = match choice.measured {
+            MeasuredChoice::Known(sd) => {
+                noise_words::of_given(sd, &answer.checks, gathered.levels.first(), structure)
+            }
+            _ => None,
+        };
         // Rows that were interpolated or hold large errors share them, which the test of a change takes for independent.
         let is_plain = !choice.resample
             && choice.prefactor
             && !answer.lag_corrected
+            && alike.is_empty()
             && !matches!(choice.measured, MeasuredChoice::Known(_));
         let changed = is_plain.then(|| gathered.stretches.changed(fit, structure)).flatten();
-        Self { coarse, varies, changed: changed.filter(|changed| changed.shows(answer)) }
+        Self { coarse, varies, changed: changed.filter(|changed| changed.shows(answer)), alike, given }
     }
 
     /// What is said of it; `cut` has the step.
@@ -48,6 +64,13 @@ impl Doubts {
         let coarse = self.coarse.as_ref().map(|coarse| words::of_steps(coarse, cut.step, unit));
         let name = |changed: &Changed| choice.records[changed.record].name.clone();
         let changed = self.changed.as_ref().map(|changed| words::of_change(changed, &name(changed), unit));
-        coarse.into_iter().chain(said(&self.varies, choice, answer)).chain(changed).collect()
+        let of_noise = [
+            noise_words::of_memory(&self.alike.iter().collect::<Vec<_>>(), cut.step, unit),
+            noise_words::of_form(&answer.diffusion(choice).form, answer),
+            self.given.clone(),
+            noise_words::of_extrapolation(answer),
+        ];
+        let of_noise = of_noise.into_iter().flatten();
+        of_noise.chain(coarse).chain(said(&self.varies, choice, answer)).chain(changed).collect()
     }
 }

@@ -3,8 +3,8 @@
 //! Next file to read: `answer.rs`.
 
 use starlings_estimators::inference::{
-    Basis, Coefficient, Fit, InferenceError, NoiseCheck, Pairs, Posterior, Structure, Sums, Verdict,
-    lag_spread, noise_checks, varying,
+    Basis, Coefficient, Fit, InferenceError, NoiseCheck, NoiseForm, Pairs, Posterior, Structure, Sums,
+    Verdict, lag_spread, noise_checks, noise_form, varying,
 };
 use starlings_study::infer_choice::{InferChoice, MeasuredChoice};
 
@@ -23,8 +23,10 @@ pub(crate) enum Given<'a> {
 pub(crate) struct Fitted {
     pub(crate) posterior: Posterior,
     pub(crate) checks: Vec<NoiseCheck>,
-    /// Whether errors of the measurement were taken out of the noise.
-    pub(crate) lag_corrected: bool,
+    /// In what the noise has not the form that the study holds it to have.
+    pub(crate) departs: Vec<NoiseForm>,
+    /// How it was made in the end.
+    pub(crate) fit: Fit,
 }
 
 impl Fitted {
@@ -53,18 +55,24 @@ impl Fitted {
         let matters = checks.iter().any(|check| check.verdict == Verdict::Matters);
         let is_auto = choice.measured == MeasuredChoice::Auto;
         // What interpolation takes out of single steps, neighbouring ones have together.
-        let mut lag_corrected = (matters && is_auto) || choice.resample;
+        let mut fit = Fit { lag_corrected: (matters && is_auto) || choice.resample, ..fit.clone() };
         let freed = Fit { lag_corrected: true, ..fit.clone() };
-        if lag_corrected {
+        if fit.lag_corrected {
             posterior = freed.posterior(sums, structure)?;
         } else if is_auto && checks.iter().any(NoiseCheck::is_sure) {
             // A long recording knows its coefficients so well that small errors matter too.
             let without = freed.posterior(sums, structure).ok();
             if let Some(without) = without.filter(|without| is_moved(&posterior, without)) {
-                (posterior, lag_corrected) = (without, true);
+                (posterior, fit) = (without, freed);
             }
         }
-        Ok(Self { posterior, checks, lag_corrected })
+        let mut departs = noise_form(&fit.diffusion, sums, structure, &posterior, FALSE_ALARM)?;
+        if !departs.is_empty() && fit.prefactor {
+            fit.whole_in_jacobian = true;
+            posterior = fit.posterior(sums, structure)?;
+            departs = noise_form(&fit.diffusion, sums, structure, &posterior, FALSE_ALARM)?;
+        }
+        Ok(Self { posterior, checks, departs, fit })
     }
 }
 

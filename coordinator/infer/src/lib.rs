@@ -38,6 +38,7 @@ pub mod forecast;
 mod gather;
 mod hidden;
 mod missing;
+mod noise_words;
 mod outlook;
 mod parts;
 mod progress;

@@ -73,7 +73,7 @@ pub fn infer(
         MeasuredChoice::Known(sd) => Answer::smoothed(&asked, cut, sd, &gathered.levels, &mut teller)?,
         _ => Answer::of(choice, &asked.fit, structure, (&asked.question.basis, &gathered))?,
     };
-    let fit = Fit { lag_corrected: answer.lag_corrected, ..asked.fit.clone() };
+    let fit = answer.fit(&asked.fit);
     let missing = missing(&asked, &fit, &gathered, cut, fleet, (reader, &mut teller))?;
     teller.posterior();
     let convergence = convergence.finish(&fit, structure, &gathered);

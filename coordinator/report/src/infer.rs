@@ -180,6 +180,7 @@ fn checks(found: &Inference) -> Vec<[String; 4]> {
         let verdict = match check.verdict {
             starlings_estimators::inference::Verdict::Matters => "errors of the measurement",
             starlings_estimators::inference::Verdict::Absent => "none that matter",
+            starlings_estimators::inference::Verdict::Alike => "neighbours are alike",
             starlings_estimators::inference::Verdict::Unclear => "too few steps to say",
         };
         let ratio =

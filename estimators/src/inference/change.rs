@@ -1,7 +1,7 @@
 //! Whether recent steps have the coefficients of earlier ones: a test of two windows with a stated rate of false alarms.
 //!
 //! With c and Ξ⁻¹ of the reference, recent steps have the score e = w − Ξ' c, whose covariance without a change is Ξ' + Ξ' Ξ⁻¹ Ξ'; its
-//! square by that covariance is χ² of as many degrees of freedom as the recent steps inform directions (F where the noise was
+//! square by that covariance, and a little of the information of as many steps of the reference, is at most χ² of as many degrees of freedom as the recent steps inform directions (F where the noise was
 //! estimated). No coefficient is fitted to the few recent steps. The noise is the reference's. (Rao 1948; Basseville & Nikiforov 1993,
 //! section 7.2.) Read next: `detector.rs`, which follows a recording.
 
@@ -13,6 +13,11 @@ use crate::quantiles::{chi_squared_tail, fisher_tail};
 
 /// Pivot of a score's correlation below which a direction is not informed.
 const INFORMED: f64 = 1e-8;
+
+/// Share of the information of as many steps of the reference that recent ones are held to have at least. In a stretch shorter than the memory
+/// of the states some directions have much less, and a score there is no Gaussian: it goes along with what the noise did (Dickey & Fuller,
+/// Journal of the American Statistical Association 1979).
+const LITTLE: f64 = 0.1;
 
 /// What recent steps say against the reference.
 #[derive(serde::Serialize, serde::Deserialize, Debug, Clone, PartialEq)]
@@ -50,7 +55,10 @@ pub fn compare(
     let appeared = (0..expected).filter(|p| !reference.active.contains(p)).filter(informed).collect();
     let normal = moments.normal(&reference.active, &inverse, true);
     let score = &normal.vector - &normal.precision * &reference.mean;
-    let covariance = &normal.precision + &normal.precision * &reference.covariance * &normal.precision;
+    let usual = &reference.precision * (recent.n_step() as f64 / reference.n_step.max(1) as f64);
+    let covariance = &normal.precision
+        + &normal.precision * &reference.covariance * &normal.precision
+        + usual * LITTLE;
     let watches = |p: &usize| (watched.is_empty() || watched.contains(p)) && informed(p);
     let rows: Vec<usize> = (0..reference.active.len()).filter(|i| watches(&reference.active[*i])).collect();
     let score = score.select_rows(&rows);

@@ -56,10 +56,10 @@ impl Diffusion {
         structure: &Structure,
         products: &DMatrix<f64>,
     ) -> Result<DMatrix<f64>, InferenceError> {
-        let mean = products * (sums.step() / sums.n_step() as f64);
+        let mean = mean(sums, products);
         let n = mean.nrows();
         let noise = match self {
-            Self::Full | Self::Known(_) => (&mean + mean.transpose()) * 0.5,
+            Self::Full | Self::Known(_) => mean,
             Self::Diagonal => DMatrix::from_diagonal(&mean.diagonal()),
             Self::Isotropic => DMatrix::from_diagonal_element(n, n, mean.trace() / n as f64),
         };
@@ -76,6 +76,12 @@ impl Diffusion {
             Self::Isotropic => Some(per_equation * sums.n_state() as f64),
         }
     }
+}
+
+/// The covariance that residuals have per time unit, from the sum of their products, L x L.
+pub(crate) fn mean(sums: &Sums, products: &DMatrix<f64>) -> DMatrix<f64> {
+    let mean = products * (sums.step() / sums.n_step() as f64);
+    (&mean + mean.transpose()) * 0.5
 }
 
 /// Whether every equation leaves residuals beyond rounding.

@@ -35,6 +35,9 @@ pub struct Fit {
     pub prefactor: bool,
     /// D from residuals at lag zero and one, which measurement noise leaves right (`noise_check.rs` says when it matters).
     pub lag_corrected: bool,
+    /// Whether V counts with the covariance that the residuals have, be the form of the noise another one: ½ D V needs the D that there
+    /// is, and a form that holds it for less leaves a bias in the coefficients (`noise_form.rs` says when it does).
+    pub whole_in_jacobian: bool,
     /// What is known beforehand.
     pub prior: Prior,
     /// Information about a coefficient, in 1/coefficient², up to which it counts as not observed. Zero: a coefficient is observed as
@@ -58,6 +61,7 @@ impl Fit {
             diffusion,
             prefactor: true,
             lag_corrected: false,
+            whole_in_jacobian: false,
             prior: Prior::flat(n_coefficient),
             least_information: 0.0,
         }
@@ -100,9 +104,10 @@ impl Fit {
         let moments = Moments::new(sums, structure);
         let first = self.diffusion.first(sums, structure)?;
         let mut noise = start.unwrap_or(&first).clone();
+        let mut whole = noise.clone();
         for passes in 1..=PASSES {
             let inverse = diffusion::inverse(&noise, structure)?;
-            let pass = self.pass(&moments, &inverse)?;
+            let pass = self.pass(&moments, &inverse, &whole)?;
             let drift = structure.matrix(&pass.active, pass.mean.as_slice());
             if let Diffusion::Known(_) = self.diffusion {
                 return self.finish(&moments, sums, pass, noise, passes);
@@ -117,11 +122,12 @@ impl Fit {
             }
             diffusion::noisy(sums, structure, &drift)?;
             let next = self.diffusion.estimate(sums, structure, &products)?;
-            let settled = change(&noise, &next) < SETTLED;
+            let shown = if self.whole_in_jacobian { diffusion::mean(sums, &products) } else { next.clone() };
+            let settled = change(&noise, &next).max(change(&whole, &shown)) < SETTLED;
             if (0..next.nrows()).any(|l| next[(l, l)] > RUNAWAY * first[(l, l)]) {
                 return Err(InferenceError::NotSettled { passes });
             }
-            noise = next;
+            (noise, whole) = (next, shown);
             if settled {
                 return self.finish(&moments, sums, pass, noise, passes);
             }
@@ -129,8 +135,13 @@ impl Fit {
         Err(InferenceError::NotSettled { passes: PASSES })
     }
 
-    /// The coefficients for an inverse of the noise.
-    pub(crate) fn pass(&self, moments: &Moments<'_>, inverse: &DMatrix<f64>) -> Result<Pass, InferenceError> {
+    /// The coefficients for an inverse of the noise, and the noise that V counts with.
+    fn pass(
+        &self,
+        moments: &Moments<'_>,
+        inverse: &DMatrix<f64>,
+        whole: &DMatrix<f64>,
+    ) -> Result<Pass, InferenceError> {
         let all = 0..moments.structure.n_coefficient();
         let informed = |p: &usize| moments.information(*p, inverse) > self.least_information;
         let observed: Vec<usize> = all.clone().filter(informed).collect();
@@ -139,7 +150,10 @@ impl Fit {
         if active.is_empty() && moments.structure.n_coefficient() > 0 {
             return Err(InferenceError::NothingObserved);
         }
-        let normal = moments.normal(&active, inverse, self.prefactor);
+        let mut normal = moments.normal(&active, inverse, self.prefactor);
+        if self.prefactor && self.whole_in_jacobian {
+            normal.vector -= moments.beside(&active, &(inverse * whole));
+        }
         let (prior_mean, prior_precision) = self.prior.select(&active);
         let precision = normal.precision + &prior_precision;
         let vector = normal.vector + prior_precision * prior_mean;
@@ -227,7 +241,7 @@ impl Fit {
                 moved[(i, j)] += scale;
                 moved[(j, i)] = moved[(i, j)];
             }
-            let pass = self.pass(moments, &diffusion::inverse(&moved, moments.structure)?)?;
+            let pass = self.pass(moments, &diffusion::inverse(&moved, moments.structure)?, &moved)?;
             if pass.active == found.active {
                 let slope = (pass.mean - &found.mean) / scale;
                 lagged::widen(&mut found.covariance, &mut found.precision, &slope, sd[(i, j)]);

@@ -39,6 +39,18 @@ impl NoiseCheck {
         self.ratio > normal(PRESENT) * self.sd
     }
 
+    /// The memory of the noise in steps where neighbouring residuals are alike: the time in which their correlation falls to 1/e, were it that
+    /// of an Ornstein–Uhlenbeck process.
+    pub fn memory(&self) -> Option<f64> {
+        (self.verdict == Verdict::Alike && self.ratio > -1.0).then(|| -1.0 / (-self.ratio).ln())
+    }
+
+    /// The sampling error of [`Self::measured`], in the same unit; `None` where residuals at lag one are none at all.
+    pub fn measured_sd(&self) -> Option<f64> {
+        let sd = self.sd * self.measured / self.ratio;
+        (sd.is_finite() && sd > 0.0).then_some(sd)
+    }
+
     /// The same with a sampling error that is so many times as large, as where the noise is not constant.
     #[must_use]
     pub fn widened(self, times: f64) -> Self {
@@ -54,6 +66,8 @@ pub enum Verdict {
     Matters,
     /// It does not.
     Absent,
+    /// Neighbouring residuals are alike: the noise has a memory, or what the drift lacks, and no measurement noise shows.
+    Alike,
     /// There are too few steps to say.
     Unclear,
 }
@@ -89,6 +103,7 @@ pub fn noise_checks(
 fn verdict(ratio: f64, sd: f64) -> Verdict {
     let margin = normal(SURE) * sd;
     match ratio - MATTERS {
+        _ if ratio < -MATTERS - margin => Verdict::Alike,
         above if above > margin => Verdict::Matters,
         above if above < -margin => Verdict::Absent,
         _ => Verdict::Unclear,

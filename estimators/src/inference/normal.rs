@@ -74,11 +74,23 @@ impl<'a> Moments<'a> {
         if prefactor {
             slope -= self.v * 0.5;
         }
+        Normal { precision, vector: self.along(active, &slope) }
+    }
+
+    /// h Σ s (…)_lb over the places of each of these coefficients, for a matrix L x B.
+    fn along(&self, active: &[usize], slope: &DMatrix<f64>) -> DVector<f64> {
         let of = |p: &usize| {
             let places = self.places(*p).iter();
             self.step * places.map(|a| a.factor * slope[(a.equation, a.function)]).sum::<f64>()
         };
-        Normal { precision, vector: DVector::from_iterator(n, active.iter().map(of)) }
+        DVector::from_iterator(active.len(), active.iter().map(of))
+    }
+
+    /// h Σ ½ Fᵀ (W D − 1) V of the coefficients at these indices: what V adds to their vector where the weights W are not the inverse of the
+    /// noise D, for W D.
+    pub(crate) fn beside(&self, active: &[usize], weighted: &DMatrix<f64>) -> DVector<f64> {
+        let n = weighted.nrows();
+        self.along(active, &((weighted - DMatrix::identity(n, n)) * self.v * 0.5))
     }
 
     /// Number of these coefficients that enter each equation, length L.

@@ -5,7 +5,7 @@
 use std::sync::Arc;
 
 use starlings_estimators::inference::{
-    Detector, Following, InferenceError, Memory, Posterior, Report, Stream, Window,
+    Detector, Following, InferenceError, Memory, Posterior, Report, Stream, Verdict, Window,
 };
 
 use super::line::{self, Line};
@@ -13,6 +13,10 @@ use super::state::{self, Saved};
 use crate::error::InferError;
 use crate::fitted::{Fitted, Given};
 use crate::run::Asked;
+
+/// Why there is no test where errors of the measurement matter.
+const NOISY: &str = "no test of a change: errors of the measurement matter, which neighbouring residuals share, so that no rate of false alarms \
+                     holds; average rows to fewer and longer steps";
 
 /// The estimate and the detector.
 pub(super) struct Follower<'a> {
@@ -23,6 +27,8 @@ pub(super) struct Follower<'a> {
     window: Window,
     posterior: Option<Posterior>,
     lag_corrected: bool,
+    /// Whether errors of the measurement matter, as far as the last block: then neighbouring residuals share them, and no test holds.
+    is_noisy: bool,
     /// Why there is no estimate or no test.
     error: Option<String>,
     pub(super) n_step: u64,
@@ -51,6 +57,7 @@ impl<'a> Follower<'a> {
             window: Window::new(memory),
             posterior: None,
             lag_corrected: false,
+            is_noisy: false,
             error: None,
             n_step: 0,
             time: f64::NAN,
@@ -74,12 +81,19 @@ impl<'a> Follower<'a> {
         }
         let block = self.stream.take()?;
         self.window.push(block)?;
+        let report = report.filter(|_| !self.is_noisy);
+        if self.is_noisy {
+            self.error.get_or_insert_with(|| NOISY.to_owned());
+        }
         if let Some(report) = report.as_ref().filter(|report| report.alarm) {
             self.restart(report)?;
         }
         let fitted = self.fitted();
         let fitted = self.known(fitted)?.flatten();
-        self.lag_corrected = fitted.as_ref().is_some_and(|fitted| fitted.lag_corrected);
+        self.lag_corrected = fitted.as_ref().is_some_and(|fitted| fitted.fit.lag_corrected);
+        self.is_noisy = fitted.as_ref().is_some_and(|fitted| {
+            fitted.checks.iter().any(|check| check.verdict == Verdict::Matters)
+        });
         self.posterior = fitted.map(|fitted| fitted.posterior);
         Ok(Some(self.line(report.as_ref())))
     }
@@ -139,6 +153,7 @@ impl<'a> Follower<'a> {
             stream: self.stream.state()?,
             window: self.window.clone(),
             posterior: self.posterior.clone(),
+            is_noisy: self.is_noisy,
         })
     }
 
@@ -157,7 +172,7 @@ impl<'a> Follower<'a> {
         self.detector = fresh.detector.resume(saved.detector)?;
         self.stream = Stream::resume(Arc::clone(basis), saved.stream)?;
         (self.window, self.posterior) = (saved.window, saved.posterior);
-        (self.n_step, self.time) = (saved.n_step, saved.time);
+        (self.n_step, self.time, self.is_noisy) = (saved.n_step, saved.time, saved.is_noisy);
         Ok(())
     }
 }

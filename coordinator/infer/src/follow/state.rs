@@ -23,6 +23,9 @@ pub(crate) struct Saved {
     pub(crate) stream: StreamState,
     pub(crate) window: Window,
     pub(crate) posterior: Option<Posterior>,
+    /// Whether errors of the measurement matter.
+    #[serde(default)]
+    pub(crate) is_noisy: bool,
 }
 
 /// Tells what is asked of which columns from anything else: the model with its constants and functions, the sampling step, the columns,

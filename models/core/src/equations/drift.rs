@@ -74,7 +74,7 @@ fn drive(u: &[f64]) -> Drive<'_> {
 
 impl Drift {
     /// The drift of equations in their parameters `unknown`. Functions of a parameter or of an equation that `left` names are to be
-    /// taken at the start of a step.
+    /// taken at the start of a step, as are those that jump where a state moves them.
     ///
     /// # Errors
     /// [`SetupError::Unknown`] for an unknown that no rate has, [`SetupError::Expression`] for a rate that is not linear in the
@@ -120,7 +120,8 @@ impl Drift {
         for text in texts {
             let told = |error| fault("function of the inference".to_owned(), text, error);
             let node = names.inline(Expression::parse(text).map_err(told)?.node()).map_err(told)?;
-            let function = collected.function(&node, text.clone(), left.contains(text)).map_err(told)?;
+            let left = left.contains(text) || collected.jumps(&node);
+            let function = collected.function(&node, text.clone(), left).map_err(told)?;
             collected.drift.functions.push(function);
         }
         Ok(collected.drift.functions)
@@ -186,6 +187,7 @@ impl Collected<'_> {
         if factor.abs() <= 0.0 {
             return Ok(None);
         }
+        let left = left || self.jumps(&node);
         let same = |k: &usize| self.nodes[*k] == node && self.drift.functions[*k].left == left;
         if let Some(function) = (0..self.nodes.len()).find(same) {
             return Ok(Some(DriftPlace { equation, function, factor }));
@@ -194,6 +196,12 @@ impl Collected<'_> {
         self.drift.functions.push(function);
         self.nodes.push(node);
         Ok(Some(DriftPlace { equation, function: self.nodes.len() - 1, factor }))
+    }
+
+    /// Whether a function jumps where a state moves it: its slope has no value there, and the term that the mid-point needs of it none either.
+    fn jumps(&self, node: &Node) -> bool {
+        let moves = |name: &str| self.names.state(name).is_some();
+        Expression::new(String::new(), node.clone()).jumps(&moves)
     }
 
     fn function(&self, node: &Node, name: String, left: bool) -> Result<DriftFunction, ExpressionError> {

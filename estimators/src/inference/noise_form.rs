@@ -1,0 +1,76 @@
+//! Whether the noise has the form that it is held to have: independent noise of every equation, or of one size.
+//!
+//! A form that holds less than there is leaves a bias in coefficients of the mid-point, whose ½ D V needs the D that there is, and intervals
+//! that are those of another noise. Read next: `fit.rs`, which can let V count with all that residuals share.
+
+use nalgebra::DMatrix;
+
+use super::normal::spread;
+use super::{Diffusion, InferenceError, Posterior, Structure, Sums, diffusion};
+use crate::quantiles::normal;
+
+/// How the noise of two equations departs from the form that it is held to have.
+#[derive(Debug, Clone, PartialEq)]
+pub enum NoiseForm {
+    /// It is shared: the correlation.
+    Shared([String; 2], f64),
+    /// It is of two sizes where it is held to be of one: the variances per time unit.
+    Unequal([String; 2], [f64; 2]),
+}
+
+/// Pairs of equations whose noise departs from the form of a fit, the furthest first; by chance in `by_chance` of all recordings where it
+/// has that form.
+///
+/// # Errors
+/// `Shape`.
+pub fn noise_form(
+    form: &Diffusion,
+    sums: &Sums,
+    structure: &Structure,
+    posterior: &Posterior,
+    by_chance: f64,
+) -> Result<Vec<NoiseForm>, InferenceError> {
+    structure.fits(sums.n_state(), sums.n_function())?;
+    let n = sums.n_state();
+    if matches!(form, Diffusion::Full | Diffusion::Known(_)) || n < 2 {
+        return Ok(Vec::new());
+    }
+    let shown = shown(sums, structure, posterior);
+    let names = |i: usize, j: usize| [i, j].map(|l| structure.equations()[l].clone());
+    let n_test = n * (n - 1) / 2 * if matches!(form, Diffusion::Isotropic) { 2 } else { 1 };
+    let limit = normal(1.0 - 0.5 * by_chance / n_test as f64);
+    let mut found = Vec::new();
+    for i in 0..n {
+        for j in 0..i {
+            let (Some(of_i), Some(of_j)) = (posterior.degrees_of(i), posterior.degrees_of(j)) else { continue };
+            let [d_i, d_j] = [shown[(i, i)], shown[(j, j)]];
+            if d_i <= 0.0 || d_j <= 0.0 {
+                continue;
+            }
+            let correlation = shown[(j, i)] / (d_i * d_j).sqrt();
+            // Fisher's z, whose variance does not depend on the correlation.
+            let far = correlation.clamp(-1.0, 1.0).atanh().abs() * (of_i * of_j).sqrt().sqrt();
+            if far > limit {
+                found.push((far, NoiseForm::Shared(names(j, i), correlation)));
+            }
+            // The logarithm of a variance has a variance of 2 over its degrees of freedom.
+            let apart = (d_i / d_j).ln().abs() / (2.0 / of_i + 2.0 / of_j).sqrt();
+            if matches!(form, Diffusion::Isotropic) && apart > limit {
+                found.push((apart, NoiseForm::Unequal(names(j, i), [d_j, d_i])));
+            }
+        }
+    }
+    found.sort_by(|a, b| b.0.total_cmp(&a.0));
+    Ok(found.into_iter().map(|(_, found)| found).collect())
+}
+
+/// D as the residuals have it, whatever the form.
+fn shown(sums: &Sums, structure: &Structure, posterior: &Posterior) -> DMatrix<f64> {
+    let part = |phi: &DMatrix<f64>| spread(structure, &posterior.active, &posterior.covariance, phi);
+    let mut products = sums.residuals(&posterior.drift) + part(&sums.phi());
+    if !posterior.shares.is_empty() && sums.n_pair() > 0 {
+        let lagged = sums.lagged_residuals(&posterior.drift) + part(&sums.lagged_phi());
+        products += (&lagged + lagged.transpose()) * (sums.n_step() as f64 / sums.n_pair() as f64);
+    }
+    diffusion::mean(sums, &products)
+}
