@@ -118,6 +118,13 @@ impl LeastSquares {
         }
     }
 
+    /// Keeps the first `n` components within so far of zero, or within where they stand where that is further, from the next step on.
+    pub fn hold(&mut self, n: usize, within: f64) {
+        for (bound, z) in self.prior.bounds.iter_mut().zip(self.z.iter()).take(n) {
+            *bound = [bound[0].max(z.min(-within)), bound[1].min(z.max(within))];
+        }
+    }
+
     /// What it needs next.
     pub fn need(&self) -> &Need {
         &self.need

@@ -71,10 +71,11 @@ pub(crate) fn lacking_shares(
     (!carries_its_share(train, held_out) && !settles(whole, part)).then_some((train, held_out))
 }
 
-/// Whether a further effect settles what its partner leaves: a discrepancy of another kind, of which nothing is left but noise of the stated
-/// size, held out or not. How uncertain a noise is that was found excuses nothing here.
+/// Whether a further effect settles what its partner leaves: a discrepancy of another kind, or held-out data that fail, of which nothing is
+/// left but noise of the stated size, held out or not. How uncertain a noise is that was found excuses nothing here.
 pub(crate) fn settles(whole: &JudgedFit<'_>, part: &JudgedFit<'_>) -> bool {
-    part.inflation > DISCREPANT && is_noise(&whole.adequacy, &whole.held_out)
+    let leaves = part.inflation > DISCREPANT || part.held_out.iter().any(|h| h.fails);
+    leaves && is_noise(&whole.adequacy, &whole.held_out)
 }
 
 fn is_noise(left: &Adequacy, held_out: &[HeldOut]) -> bool {

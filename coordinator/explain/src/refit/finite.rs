@@ -9,6 +9,7 @@ use std::collections::HashSet;
 use starlings_models::EffectDef;
 use starlings_models::equations::Expression;
 
+use super::pairs::hold_own;
 use super::search::Searcher;
 use crate::error::ExplainError;
 use crate::fit::candidate::Candidate;
@@ -53,6 +54,7 @@ impl<'c> Searcher<'_, '_, 'c> {
         let mut begun = Vec::new();
         for (index, candidate) in self.candidates.iter().enumerate().filter(|(_, c)| is_nonlinear(&c.def)) {
             let mut fits = held(&found.base, candidate, index);
+            hold_own(&mut fits);
             self.cut_short |= !drive_rounds(self.cache, &mut fits, ROUNDS)?;
             // Far from where the model was fitted the data may leave a direction free; nothing can be scored there.
             let is_known =

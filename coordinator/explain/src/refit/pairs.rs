@@ -29,6 +29,10 @@ const FINAL: usize = 3;
 /// Part of the way to the amplitudes that the scores promise at which a refit begins: as far as the influences surely hold.
 const FIRST_WAY: f64 = 0.1;
 
+/// Prior standard deviations within which the model's own parameters stay beside two effects, unless they were further already: beyond, two
+/// terms that nearly cancel run away together, and a run takes its million steps.
+const FARTHEST: f64 = 8.0;
+
 /// One effect as a member of a pair.
 struct Member {
     result: ScreeningResult,
@@ -62,7 +66,9 @@ impl<'c> Searcher<'_, '_, 'c> {
         let optimum = found.base.optimum()?;
         let threshold = found.null_distribution.threshold;
         let mut fits: Vec<FittedVariant<'c>> = Vec::new();
-        for pair in best_pairs(&members, optimum.residual()) {
+        // What was asked for by name is tried together, however little it adds to first order.
+        let share = if self.asked { 0.0 } else { SECOND_SHARE };
+        for pair in best_pairs(&members, optimum.residual(), share) {
             // The noise is that of the residuals without the pair.
             let [a, b] = pair.members.map(|m| &members[m]);
             let taken = &a.own * pair.amplitudes[0] + &b.own * pair.amplitudes[1];
@@ -109,6 +115,7 @@ impl<'c> Searcher<'_, '_, 'c> {
         &mut self,
         mut fits: Vec<FittedVariant<'c>>,
     ) -> Result<Vec<FittedVariant<'c>>, ExplainError> {
+        hold_own(&mut fits);
         self.cut_short |= !drive_rounds(self.cache, &mut fits, ROUNDS)?;
         fits.retain(|fit| !fit.residual().is_empty());
         fits.sort_by(|a, b| a.promised().total_cmp(&b.promised()));
@@ -172,8 +179,15 @@ impl<'c> Searcher<'_, '_, 'c> {
     }
 }
 
+/// Keeps the model's own parameters where they may be in these fits.
+pub(super) fn hold_own(fits: &mut [FittedVariant<'_>]) {
+    for fit in fits {
+        fit.solver.hold(fit.variant.n_own, FARTHEST);
+    }
+}
+
 /// The pairs with the largest gain, each of whose members adds its share, one for every two candidates.
-fn best_pairs(members: &[Member], residual: &DVector<f64>) -> Vec<PairScore> {
+fn best_pairs(members: &[Member], residual: &DVector<f64>, share: f64) -> Vec<PairScore> {
     let k = members.len();
     let along = DVector::from_iterator(k, members.iter().map(|m| m.own.dot(residual)));
     let products =
@@ -188,7 +202,7 @@ fn best_pairs(members: &[Member], residual: &DVector<f64>) -> Vec<PairScore> {
                 both: products[(i, j)],
             };
             if a.result.candidate != b.result.candidate
-                && let Some((amplitudes, gain)) = of.best([a.sign, b.sign])
+                && let Some((amplitudes, gain)) = of.best([a.sign, b.sign], share)
             {
                 pairs.push(PairScore { members: [i, j], amplitudes, gain });
             }
@@ -223,7 +237,7 @@ impl Normal {
     }
 
     /// The best amplitudes and their gain; `None` where a sign is not allowed, or one of the two does not add its share.
-    fn best(&self, signs: [f64; 2]) -> Option<([f64; 2], f64)> {
+    fn best(&self, signs: [f64; 2], share: f64) -> Option<([f64; 2], f64)> {
         let [n0, n1] = self.squares;
         let alike = self.both.abs() > ALIKE * (n0 * n1).sqrt();
         if alike || !(n0 > 0.0 && n1 > 0.0) {
@@ -241,7 +255,7 @@ impl Normal {
         };
         let gain = self.gain(amplitudes);
         let allowed = (0..2).all(|k| amplitudes[k] * signs[k] >= 0.0);
-        (allowed && gain.is_finite() && gain - alone(0).max(alone(1)) > SECOND_SHARE * gain)
+        (allowed && gain.is_finite() && gain - alone(0).max(alone(1)) > share * gain)
             .then_some((amplitudes, gain))
     }
 }
@@ -258,7 +272,7 @@ mod tests {
     #[test]
     fn two_effects_that_hide_each_other_are_found_with_both_amplitudes() {
         // Alone neither shows: along the first the residual is 10 - 0.9 · 10 = 1.
-        let ([a, b], gain) = normal(-0.9, [10.0, 10.0]).best([1.0, 1.0]).unwrap();
+        let ([a, b], gain) = normal(-0.9, [10.0, 10.0]).best([1.0, 1.0], SECOND_SHARE).unwrap();
         // Exact up to rounding: the fall of χ² is the square of the residual, 100 + 100 - 2 · 0.9 · 100.
         assert!(
             (a - 10.0).abs() < 1e-9 && (b - 10.0).abs() < 1e-9 && (gain - 20.0).abs() < 1e-9,
@@ -268,9 +282,9 @@ mod tests {
 
     #[test]
     fn a_pair_of_the_wrong_sign_or_with_a_member_that_adds_nothing_is_none() {
-        assert!(normal(-0.5, [10.0, -10.0]).best([1.0, 1.0]).is_none(), "the second would be negative");
-        assert!(normal(-0.5, [10.0, -10.0]).best([1.0, 0.0]).is_some(), "either sign is allowed");
-        assert!(normal(0.0, [10.0, 0.5]).best([1.0, 1.0]).is_none(), "the second adds 0.2 %");
-        assert!(normal(0.999, [10.0, 10.0]).best([1.0, 1.0]).is_none(), "both are one");
+        assert!(normal(-0.5, [10.0, -10.0]).best([1.0, 1.0], SECOND_SHARE).is_none(), "the second would be negative");
+        assert!(normal(-0.5, [10.0, -10.0]).best([1.0, 0.0], SECOND_SHARE).is_some(), "either sign is allowed");
+        assert!(normal(0.0, [10.0, 0.5]).best([1.0, 1.0], SECOND_SHARE).is_none(), "the second adds 0.2 %");
+        assert!(normal(0.999, [10.0, 10.0]).best([1.0, 1.0], SECOND_SHARE).is_none(), "both are one");
     }
 }

@@ -14,9 +14,10 @@ use crate::fit::fitted_variant::FittedVariant;
 use crate::fit::kind::Kind;
 use crate::fit::model_variant::{AddedEffect, ModelVariant};
 use crate::judge::adequacy::Adequacy;
+use crate::judge::contribution::check_contributions;
 use crate::judge::effective_noise::inflation;
 use crate::judge::gates::{JudgedFit, judge};
-use crate::judge::held_out::held_out;
+use crate::judge::held_out::{FAILS, held_out};
 use crate::judge::misfit::Misfit;
 use crate::judge::null_distribution::{LEAST, NullDistribution};
 use crate::judge::objections::SHARE;
@@ -92,13 +93,23 @@ pub(crate) fn search<'c>(
         searcher.cache.foreseen.goes(Course::Open);
         searcher.replace_terms(&mut found)?;
         searcher.second_pass(&mut found, options)?;
-        if options.max_effects > 1 && searcher.is_open(&found)? {
+        if options.max_effects > 1 && (searcher.is_open(&found)? || leaves_something(&found)) {
             searcher.refit_pairs(&mut found)?;
             searcher.second_pass(&mut found, options)?;
         }
     }
     found.cut_short = searcher.cut_short || searcher.cache.was_cut_short();
     Ok(found)
+}
+
+/// Whether what would be named leaves more than noise, be it excused: two effects that nobody tried together may leave less.
+fn leaves_something(found: &SearchResult<'_>) -> bool {
+    let passing = found.passing();
+    if passing.is_empty() {
+        return false;
+    }
+    let best = &found.judged[check_contributions(found, &passing).best];
+    best.adequacy.is_gap() || best.held_out.iter().any(|h| h.after > FAILS * h.noise)
 }
 
 /// Largest fall of χ² in a screening, to first order, with an amplitude of a sign that physics allows.
@@ -158,7 +169,7 @@ impl<'c> Searcher<'_, '_, 'c> {
     }
 
     /// Whether nothing that was refitted would be named. What passes the gates may yet be refused, and stand before a pair that would not be.
-    fn is_open(&self, found: &SearchResult<'c>) -> Result<bool, ExplainError> {
+    pub(super) fn is_open(&self, found: &SearchResult<'c>) -> Result<bool, ExplainError> {
         Ok(found.passing().is_empty()
             || decide(self.cache, found, self.candidates)?.verdict == Verdict::Unexplained)
     }

@@ -48,7 +48,10 @@ impl<'c> Searcher<'_, '_, 'c> {
             let screening = self.rescreen(found, 0, course)?;
             let best = &found.judged[0];
             let name = best.fit.variant.name();
-            let seconds = self.seconds(best, &screening, found.null_distribution.threshold)?;
+            let mut seconds = self.seconds(best, &screening, found.null_distribution.threshold)?;
+            if seconds.is_empty() && self.is_open(found)? {
+                seconds = self.hidden_seconds(&screening, found.null_distribution.threshold);
+            }
             if seconds.is_empty() {
                 break;
             }
@@ -89,6 +92,13 @@ impl<'c> Searcher<'_, '_, 'c> {
             }
         }
         Ok(seconds)
+    }
+
+    /// The two best further effects where nothing is named: those that gain more than chance in white noise may be what makes the residuals no
+    /// noise, and to first order a small part of it where their terms bend. They count only if they settle it.
+    fn hidden_seconds(&self, screening: &[ScreeningResult], threshold: f64) -> Vec<Second> {
+        let best = self.best_of_each(screening).into_iter().filter(|result| result.score.gain > threshold);
+        best.take(MOST).map(|result| Second { result, must_settle: true }).collect()
     }
 
     /// Whether a further effect takes most of what its partner leaves, a discrepancy of its own, and gains more than chance in units of the
