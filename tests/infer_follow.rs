@@ -187,7 +187,11 @@ fn a_stream_with_errors_of_the_measurement_has_no_test_and_says_why() {
     let dir = folder(STUDY, "");
     let (code, lines, stderr) = followed(dir.path(), &data, &[]);
     assert_eq!(code, 0, "{stderr}");
-    assert_eq!(stderr.matches("no test of a change: errors of the measurement matter").count(), 1, "{stderr}");
+    assert_eq!(
+        stderr.matches("no test of a change: errors of the measurement matter").count(),
+        1,
+        "{stderr}"
+    );
     let lines: Vec<Value> = lines.iter().map(|line| serde_json::from_str(line).unwrap()).collect();
     assert_eq!(lines.len(), 20);
     assert!(lines.iter().all(|line| line["alarm"] == false && line["test"].is_null()), "{lines:?}");

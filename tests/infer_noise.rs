@@ -130,7 +130,8 @@ fn errors_of_the_measurement_that_are_given_are_held_against_the_rows() {
     };
     assert_eq!(said(&of(0.1), "is not what neighbouring rows show"), Vec::<String>::new());
     for wrong in [0.05, 0.2] {
-        let told = said(&of(wrong), &format!("measurement_noise = {wrong} is not what neighbouring rows show"));
+        let told =
+            said(&of(wrong), &format!("measurement_noise = {wrong} is not what neighbouring rows show"));
         assert!(told.len() == 1 && (told[0].contains("(0.1)") || told[0].contains("(0.09")), "{told:?}");
     }
 }

@@ -38,10 +38,11 @@ impl Doubts {
         let (choice, structure) = (asked.choice, &asked.question.structure);
         let coarse = gathered.levels.first().and_then(|sums| coarse(asked, fit, answer, sums, cut, at));
         let varies = varies(asked, fit, answer, gathered, coarse.is_some());
-        let alike: Vec<NoiseCheck> = match choice.resample {
-            // What an interpolation leaves in neighbouring residuals is taken out.
-            true => Vec::new(),
-            false => noise_words::alike(&answer.checks, structure).into_iter().cloned().collect(),
+        // What an interpolation leaves in neighbouring residuals is taken out.
+        let alike: Vec<NoiseCheck> = if choice.resample {
+            Vec::new()
+        } else {
+            noise_words::alike(&answer.checks, structure).into_iter().cloned().collect()
         };
         let given = match choice.measured {
             MeasuredChoice::Known(sd) => {

@@ -49,7 +49,9 @@ pub(crate) fn of_memory(alike: &[&NoiseCheck], step: f64, unit: &str) -> Option<
 /// That the noise has not the form that the study gives.
 pub(crate) fn of_form(form: &str, answer: &Answer) -> Option<String> {
     let of = |departs: &NoiseForm| match departs {
-        NoiseForm::Shared([a, b], correlation) => format!("{a} and {b} share theirs (correlation {correlation:.2})"),
+        NoiseForm::Shared([a, b], correlation) => {
+            format!("{a} and {b} share theirs (correlation {correlation:.2})")
+        }
         NoiseForm::Unequal([a, b], [d_a, d_b]) => {
             format!("{a} has {} and {b} {}", rounded(*d_a, 3), rounded(*d_b, 3))
         }

@@ -11,6 +11,7 @@ use starlings_study::infer_choice::ReducedChoice;
 
 use crate::error::InferError;
 use crate::result::{LEVEL, ReducedFound, UnknownFound};
+use crate::words::plural;
 
 /// Probability of χ² below which a reduced model counts as refuted.
 const REFUTED: f64 = 0.01;
@@ -67,8 +68,15 @@ pub fn check_reduced(choice: &ReducedChoice, structure: &Structure) -> Result<()
 
 /// An error with the unknowns by their names instead of numbers.
 fn named(error: &InferenceError, choice: &ReducedChoice) -> InferError {
-    let InferenceError::Collinear { columns } = error else {
-        return InferError::Reduced(error.to_string());
+    let columns = match error {
+        InferenceError::Collinear { columns } => columns,
+        InferenceError::TooFew { n_step, n_unknown, .. } => {
+            let (these, unknowns) = (plural(*n_step as usize, "coefficient"), plural(*n_unknown, "unknown"));
+            let message =
+                format!("{these} cannot determine {unknowns}: fix some of these, or infer more coefficients");
+            return InferError::Reduced(message);
+        }
+        other => return InferError::Reduced(other.to_string()),
     };
     let name = |column: &String| {
         let number = column.strip_prefix("unknown ").and_then(|n| n.parse::<usize>().ok());

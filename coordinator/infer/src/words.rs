@@ -58,7 +58,7 @@ fn lacks(missing: &MissingFound) -> String {
     format!("; of {of} the drift lacks {}", names.join(", "))
 }
 
-fn plural(n: usize, what: &str) -> String {
+pub(crate) fn plural(n: usize, what: &str) -> String {
     format!("{n} {what}{}", if n == 1 { "" } else { "s" })
 }
 

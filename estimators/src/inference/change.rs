@@ -17,7 +17,7 @@ const INFORMED: f64 = 1e-8;
 /// Share of the information of as many steps of the reference that recent ones are held to have at least. In a stretch shorter than the memory
 /// of the states some directions have much less, and a score there is no Gaussian: it goes along with what the noise did (Dickey & Fuller,
 /// Journal of the American Statistical Association 1979).
-const LITTLE: f64 = 0.1;
+const LITTLE: f64 = 0.05;
 
 /// What recent steps say against the reference.
 #[derive(serde::Serialize, serde::Deserialize, Debug, Clone, PartialEq)]
@@ -56,9 +56,8 @@ pub fn compare(
     let normal = moments.normal(&reference.active, &inverse, true);
     let score = &normal.vector - &normal.precision * &reference.mean;
     let usual = &reference.precision * (recent.n_step() as f64 / reference.n_step.max(1) as f64);
-    let covariance = &normal.precision
-        + &normal.precision * &reference.covariance * &normal.precision
-        + usual * LITTLE;
+    let covariance =
+        &normal.precision + &normal.precision * &reference.covariance * &normal.precision + usual * LITTLE;
     let watches = |p: &usize| (watched.is_empty() || watched.contains(p)) && informed(p);
     let rows: Vec<usize> = (0..reference.active.len()).filter(|i| watches(&reference.active[*i])).collect();
     let score = score.select_rows(&rows);

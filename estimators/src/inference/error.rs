@@ -133,8 +133,9 @@ pub enum InferenceError {
     },
     /// Coefficients and noise do not settle.
     #[error(
-        "coefficients and noise have not settled after {passes} passes: there are too few steps for so many terms, or \
-         each is too long for the dynamics"
+        "coefficients and noise have not settled after {passes} pass{}: there are too few steps for so many terms, or \
+         each is too long for the dynamics",
+        if *passes == 1 { "" } else { "es" }
     )]
     NotSettled {
         /// Passes made.

@@ -42,7 +42,9 @@ pub fn noise_form(
     let mut found = Vec::new();
     for i in 0..n {
         for j in 0..i {
-            let (Some(of_i), Some(of_j)) = (posterior.degrees_of(i), posterior.degrees_of(j)) else { continue };
+            let (Some(of_i), Some(of_j)) = (posterior.degrees_of(i), posterior.degrees_of(j)) else {
+                continue;
+            };
             let [d_i, d_j] = [shown[(i, i)], shown[(j, j)]];
             if d_i <= 0.0 || d_j <= 0.0 {
                 continue;

@@ -170,8 +170,8 @@ fn false_alarms_of_all_lengths_together_are_as_rare_as_stated() {
     }
     let rate = f64::from(u32::try_from(alarms).unwrap()) / blocks as f64;
     println!("{alarms} of {blocks}: {rate:.4}");
-    // Tests of one time share their rows, so there are fewer; sd of about 0.001.
-    assert!((0.003..0.012).contains(&rate), "{rate}");
+    // Tests of one time share their rows, and a little is added to the variance of each, so there are fewer; sd of about 0.001.
+    assert!((0.001..0.012).contains(&rate), "{rate}");
 }
 
 /// To the last bit after any block, and not with a state that has no longer stretches.

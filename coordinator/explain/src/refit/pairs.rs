@@ -282,8 +282,14 @@ mod tests {
 
     #[test]
     fn a_pair_of_the_wrong_sign_or_with_a_member_that_adds_nothing_is_none() {
-        assert!(normal(-0.5, [10.0, -10.0]).best([1.0, 1.0], SECOND_SHARE).is_none(), "the second would be negative");
-        assert!(normal(-0.5, [10.0, -10.0]).best([1.0, 0.0], SECOND_SHARE).is_some(), "either sign is allowed");
+        assert!(
+            normal(-0.5, [10.0, -10.0]).best([1.0, 1.0], SECOND_SHARE).is_none(),
+            "the second would be negative"
+        );
+        assert!(
+            normal(-0.5, [10.0, -10.0]).best([1.0, 0.0], SECOND_SHARE).is_some(),
+            "either sign is allowed"
+        );
         assert!(normal(0.0, [10.0, 0.5]).best([1.0, 1.0], SECOND_SHARE).is_none(), "the second adds 0.2 %");
         assert!(normal(0.999, [10.0, 10.0]).best([1.0, 1.0], SECOND_SHARE).is_none(), "both are one");
     }

@@ -91,9 +91,9 @@ impl<'a> Follower<'a> {
         let fitted = self.fitted();
         let fitted = self.known(fitted)?.flatten();
         self.lag_corrected = fitted.as_ref().is_some_and(|fitted| fitted.fit.lag_corrected);
-        self.is_noisy = fitted.as_ref().is_some_and(|fitted| {
-            fitted.checks.iter().any(|check| check.verdict == Verdict::Matters)
-        });
+        self.is_noisy = fitted
+            .as_ref()
+            .is_some_and(|fitted| fitted.checks.iter().any(|check| check.verdict == Verdict::Matters));
         self.posterior = fitted.map(|fitted| fitted.posterior);
         Ok(Some(self.line(report.as_ref())))
     }

@@ -122,7 +122,12 @@ fn check_functions(
                     .find(|p| *p.get_ref() == expression)
                     .map_or(section.span.clone(), Spanned::span);
                 let message = format!("in the {place} (`{expression}`, column {column}): {message}");
-                let help = "coefficients are inferred where the rates are linear in them; give other parameters as constants";
+                // A function that the study writes has no coefficient inside.
+                let help = if place.starts_with("function") {
+                    "a function reads states, inputs, outputs and constants"
+                } else {
+                    "coefficients are inferred where the rates are linear in them; give other parameters as constants"
+                };
                 source.report_with(span, message, help);
             }
             other => source.report(section.span.clone(), other.to_string()),
