@@ -75,7 +75,12 @@ pub(crate) fn lacking_shares(
 /// left but noise of the stated size, held out or not. How uncertain a noise is that was found excuses nothing here.
 pub(crate) fn settles(whole: &JudgedFit<'_>, part: &JudgedFit<'_>) -> bool {
     let leaves = part.inflation > DISCREPANT || part.held_out.iter().any(|h| h.fails);
-    leaves && is_noise(&whole.adequacy, &whole.held_out)
+    leaves && leaves_noise(whole)
+}
+
+/// Whether a variant leaves nothing but noise of the stated size, held out or not.
+pub(crate) fn leaves_noise(of: &JudgedFit<'_>) -> bool {
+    is_noise(&of.adequacy, &of.held_out)
 }
 
 fn is_noise(left: &Adequacy, held_out: &[HeldOut]) -> bool {

@@ -17,7 +17,7 @@ use crate::rows::{Row, Rows, Usage};
 use crate::run_cache::RunCache;
 
 /// Root mean square over its expectation above which held-out data fail ...
-pub(crate) const FAILS: f64 = 1.25;
+const FAILS: f64 = 1.25;
 /// ... and which must also lie outside the band of this probability, which is wider where the noise was found and not given.
 const LEVEL: f64 = 0.9998;
 /// What the uncertainty of the estimate explains is known to first order only: a rest below this share of it is no failure.

@@ -14,10 +14,10 @@ use crate::fit::fitted_variant::FittedVariant;
 use crate::fit::kind::Kind;
 use crate::fit::model_variant::{AddedEffect, ModelVariant};
 use crate::judge::adequacy::Adequacy;
-use crate::judge::contribution::check_contributions;
+use crate::judge::contribution::{check_contributions, leaves_noise};
 use crate::judge::effective_noise::inflation;
 use crate::judge::gates::{JudgedFit, judge};
-use crate::judge::held_out::{FAILS, held_out};
+use crate::judge::held_out::held_out;
 use crate::judge::misfit::Misfit;
 use crate::judge::null_distribution::{LEAST, NullDistribution};
 use crate::judge::objections::SHARE;
@@ -93,8 +93,13 @@ pub(crate) fn search<'c>(
         searcher.cache.foreseen.goes(Course::Open);
         searcher.replace_terms(&mut found)?;
         searcher.second_pass(&mut found, options)?;
-        if options.max_effects > 1 && (searcher.is_open(&found)? || leaves_something(&found)) {
+        let is_open = searcher.is_open(&found)?;
+        if options.max_effects > 1 && (is_open || is_a_pair_that_leaves_more(&found)) {
+            let known: Vec<String> = found.judged.iter().map(|j| j.fit.variant.name()).collect();
             searcher.refit_pairs(&mut found)?;
+            if !is_open {
+                found.judged.retain(|j| known.contains(&j.fit.variant.name()) || leaves_noise(j));
+            }
             searcher.second_pass(&mut found, options)?;
         }
     }
@@ -102,14 +107,15 @@ pub(crate) fn search<'c>(
     Ok(found)
 }
 
-/// Whether what would be named leaves more than noise, be it excused: two effects that nobody tried together may leave less.
-fn leaves_something(found: &SearchResult<'_>) -> bool {
+/// Whether two effects would be named that leave more than noise, be it excused: the second was looked for beside the first, and another two
+/// that nobody tried together may leave nothing else.
+fn is_a_pair_that_leaves_more(found: &SearchResult<'_>) -> bool {
     let passing = found.passing();
     if passing.is_empty() {
         return false;
     }
     let best = &found.judged[check_contributions(found, &passing).best];
-    best.adequacy.is_gap() || best.held_out.iter().any(|h| h.after > FAILS * h.noise)
+    best.fit.variant.effects.len() > 1 && !leaves_noise(best)
 }
 
 /// Largest fall of χ² in a screening, to first order, with an amplitude of a sign that physics allows.
