@@ -1,7 +1,7 @@
 //! Whether recent steps have the coefficients of earlier ones: a test of two windows with a stated rate of false alarms.
 //!
 //! With c and Ξ⁻¹ of the reference, recent steps have the score e = w − Ξ' c, whose covariance without a change is Ξ' + Ξ' Ξ⁻¹ Ξ'; its
-//! square by that covariance, and a little of the information of as many steps of the reference, is at most χ² of as many degrees of freedom as the recent steps inform directions (F where the noise was
+//! square by that covariance, and a little of the information of as many steps of the reference, is χ², or less, of as many degrees of freedom as the recent steps inform directions (F where the noise was
 //! estimated). No coefficient is fitted to the few recent steps. The noise is the reference's. (Rao 1948; Basseville & Nikiforov 1993,
 //! section 7.2.) Read next: `detector.rs`, which follows a recording.
 
@@ -17,7 +17,7 @@ const INFORMED: f64 = 1e-8;
 /// Share of the information of as many steps of the reference that recent ones are held to have at least. In a stretch shorter than the memory
 /// of the states some directions have much less, and a score there is no Gaussian: it goes along with what the noise did (Dickey & Fuller,
 /// Journal of the American Statistical Association 1979).
-const LITTLE: f64 = 0.05;
+const LITTLE: f64 = 0.03;
 
 /// What recent steps say against the reference.
 #[derive(serde::Serialize, serde::Deserialize, Debug, Clone, PartialEq)]

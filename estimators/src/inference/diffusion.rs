@@ -72,9 +72,15 @@ impl Diffusion {
         let per_equation = sums.n_step() as f64 - n_active as f64 / sums.n_state() as f64;
         match self {
             Self::Known(_) => None,
-            Self::Full | Self::Diagonal => Some(per_equation),
-            Self::Isotropic => Some(per_equation * sums.n_state() as f64),
+            Self::Full | Self::Diagonal | Self::Isotropic => {
+                Some(per_equation * self.n_shared(sums.n_state()))
+            }
         }
+    }
+
+    /// Equations, of all L, whose residuals tell one variance together.
+    pub(crate) fn n_shared(&self, n_state: usize) -> f64 {
+        if matches!(self, Self::Isotropic) { n_state as f64 } else { 1.0 }
     }
 }
 

@@ -10,7 +10,9 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::diffusion::{self, Diffusion};
-use super::normal::{Moments, invert, invert_shared, spread};
+use super::normal::{Moments, invert, invert_shared};
+use super::pass_noise::Noise;
+use super::residual_products::ResidualProducts;
 use super::{InferenceError, Posterior, Prior, Structure, Sums, lagged};
 
 /// Change of D, relative to itself, below which it has settled.
@@ -37,6 +39,7 @@ pub struct Fit {
     pub lag_corrected: bool,
     /// Whether V counts with the covariance that the residuals have, be the form of the noise another one: ½ D V needs the D that there
     /// is, and a form that holds it for less leaves a bias in the coefficients (`noise_form.rs` says when it does).
+    #[serde(default)]
     pub whole_in_jacobian: bool,
     /// What is known beforehand.
     pub prior: Prior,
@@ -103,31 +106,25 @@ impl Fit {
         }
         let moments = Moments::new(sums, structure);
         let first = self.diffusion.first(sums, structure)?;
-        let mut noise = start.unwrap_or(&first).clone();
-        let mut whole = noise.clone();
+        let mut noise = Noise::of(start.unwrap_or(&first).clone());
         for passes in 1..=PASSES {
-            let inverse = diffusion::inverse(&noise, structure)?;
-            let pass = self.pass(&moments, &inverse, &whole)?;
+            let pass = self.pass(&moments, &noise)?;
             let drift = structure.matrix(&pass.active, pass.mean.as_slice());
             if let Diffusion::Known(_) = self.diffusion {
                 return self.finish(&moments, sums, pass, noise, passes);
             }
             self.enough(sums, &moments, &pass.active)?;
-            let spread = |phi: &DMatrix<f64>| spread(structure, &pass.active, &pass.covariance, phi);
-            let mut products = sums.residuals(&drift) + spread(&sums.phi());
-            if self.lag_corrected && sums.n_pair() > 0 {
-                let lagged = sums.lagged_residuals(&drift) + spread(&sums.lagged_phi());
-                let share = sums.n_step() as f64 / sums.n_pair() as f64;
-                products += (&lagged + lagged.transpose()) * share;
-            }
+            let products = pass.products(sums, structure, &drift).of_noise(self.lag_corrected);
             diffusion::noisy(sums, structure, &drift)?;
-            let next = self.diffusion.estimate(sums, structure, &products)?;
-            let shown = if self.whole_in_jacobian { diffusion::mean(sums, &products) } else { next.clone() };
-            let settled = change(&noise, &next).max(change(&whole, &shown)) < SETTLED;
-            if (0..next.nrows()).any(|l| next[(l, l)] > RUNAWAY * first[(l, l)]) {
+            let mut next = Noise::of(self.diffusion.estimate(sums, structure, &products)?);
+            if self.whole_in_jacobian {
+                next.shown = diffusion::mean(sums, &products);
+            }
+            let settled = noise.change(&next) < SETTLED;
+            if (0..sums.n_state()).any(|l| next.held[(l, l)] > RUNAWAY * first[(l, l)]) {
                 return Err(InferenceError::NotSettled { passes });
             }
-            (noise, whole) = (next, shown);
+            noise = next;
             if settled {
                 return self.finish(&moments, sums, pass, noise, passes);
             }
@@ -135,13 +132,9 @@ impl Fit {
         Err(InferenceError::NotSettled { passes: PASSES })
     }
 
-    /// The coefficients for an inverse of the noise, and the noise that V counts with.
-    fn pass(
-        &self,
-        moments: &Moments<'_>,
-        inverse: &DMatrix<f64>,
-        whole: &DMatrix<f64>,
-    ) -> Result<Pass, InferenceError> {
+    /// The coefficients for a noise.
+    fn pass(&self, moments: &Moments<'_>, noise: &Noise) -> Result<Pass, InferenceError> {
+        let inverse = &diffusion::inverse(&noise.held, moments.structure)?;
         let all = 0..moments.structure.n_coefficient();
         let informed = |p: &usize| moments.information(*p, inverse) > self.least_information;
         let observed: Vec<usize> = all.clone().filter(informed).collect();
@@ -152,7 +145,7 @@ impl Fit {
         }
         let mut normal = moments.normal(&active, inverse, self.prefactor);
         if self.prefactor && self.whole_in_jacobian {
-            normal.vector -= moments.beside(&active, &(inverse * whole));
+            normal.vector -= moments.beside(&active, &(inverse * &noise.shown));
         }
         let (prior_mean, prior_precision) = self.prior.select(&active);
         let precision = normal.precision + &prior_precision;
@@ -187,7 +180,7 @@ impl Fit {
         moments: &Moments<'_>,
         sums: &Sums,
         pass: Pass,
-        diffusion: DMatrix<f64>,
+        noise: Noise,
         passes: usize,
     ) -> Result<Posterior, InferenceError> {
         let structure = moments.structure;
@@ -198,14 +191,14 @@ impl Fit {
             shares: self.shares(sums, structure, &pass, &drift),
             n_step: sums.n_step(),
             passes,
-            diffusion,
+            diffusion: noise.held.clone(),
             drift,
             active: pass.active,
             mean: pass.mean,
             covariance: pass.covariance,
             precision: pass.precision,
         };
-        self.widen(moments, &mut found)?;
+        self.widen(moments, &noise, &mut found)?;
         if found.covariance.diagonal().iter().any(|v| !v.is_finite() || *v <= 0.0) {
             return Err(InferenceError::Overflow { what: "the variance of a coefficient" });
         }
@@ -219,29 +212,33 @@ impl Fit {
         if !self.lag_corrected || sums.n_pair() == 0 || matches!(self.diffusion, Diffusion::Known(_)) {
             return Vec::new();
         }
-        let spread = |phi: &DMatrix<f64>| spread(structure, &pass.active, &pass.covariance, phi);
-        let squares = sums.residuals(drift) + spread(&sums.phi());
-        let lagged = sums.lagged_residuals(drift) + spread(&sums.lagged_phi());
+        let products = pass.products(sums, structure, drift);
+        let (squares, lagged) = (products.squares(), products.lagged());
         let (n, pairs) = (sums.n_step() as f64, sums.n_pair() as f64);
         lagged::shares(&self.diffusion, (&squares, n), (&lagged, pairs))
     }
 
     /// Lets the coefficients be as uncertain as their share ½ D V Φ⁻¹ is, where D is from lagged residuals. From independent ones
     /// D is too well known for that to count.
-    fn widen(&self, moments: &Moments<'_>, found: &mut Posterior) -> Result<(), InferenceError> {
+    fn widen(
+        &self,
+        moments: &Moments<'_>,
+        noise: &Noise,
+        found: &mut Posterior,
+    ) -> Result<(), InferenceError> {
         if found.shares.is_empty() {
             return Ok(());
         }
         let (sd, n) = (found.diffusion_sd(), found.diffusion.nrows());
-        for entries in lagged::free(&self.diffusion, n) {
+        let whole = if self.whole_in_jacobian { &Diffusion::Full } else { &self.diffusion };
+        let held = lagged::free(&self.diffusion, n);
+        // Entries that the form holds err too where V counts with them.
+        let beside = lagged::free(whole, n).into_iter().filter(|entries| entries[0].0 != entries[0].1);
+        let all = held.iter().cloned().chain(beside.filter(|entries| !held.contains(entries)));
+        for entries in all.collect::<Vec<_>>() {
             let (i, j) = entries[0];
             let scale = SLOPE * (found.diffusion[(i, i)] * found.diffusion[(j, j)]).sqrt();
-            let mut moved = found.diffusion.clone();
-            for (i, j) in entries {
-                moved[(i, j)] += scale;
-                moved[(j, i)] = moved[(i, j)];
-            }
-            let pass = self.pass(moments, &diffusion::inverse(&moved, moments.structure)?, &moved)?;
+            let pass = self.pass(moments, &noise.moved(&entries, scale, held.contains(&entries)))?;
             if pass.active == found.active {
                 let slope = (pass.mean - &found.mean) / scale;
                 lagged::widen(&mut found.covariance, &mut found.precision, &slope, sd[(i, j)]);
@@ -251,11 +248,14 @@ impl Fit {
     }
 }
 
-/// The largest change of an entry of D, relative to the variances of its row and column.
-fn change(before: &DMatrix<f64>, after: &DMatrix<f64>) -> f64 {
-    let n = after.nrows();
-    let entries = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
-    let relative =
-        |(i, j)| (after[(i, j)] - before[(i, j)]).abs() / (after[(i, i)] * after[(j, j)]).abs().sqrt();
-    entries.map(relative).fold(0.0, f64::max)
+impl Pass {
+    /// Products of the residuals that it leaves.
+    fn products<'a>(
+        &'a self,
+        sums: &'a Sums,
+        structure: &'a Structure,
+        drift: &'a DMatrix<f64>,
+    ) -> ResidualProducts<'a> {
+        ResidualProducts { sums, structure, drift, active: &self.active, covariance: &self.covariance }
+    }
 }

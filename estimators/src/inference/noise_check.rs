@@ -7,7 +7,7 @@
 
 use nalgebra::DMatrix;
 
-use super::normal::spread;
+use super::residual_products::ResidualProducts;
 use super::{InferenceError, Posterior, Structure, Sums};
 use crate::quantiles::normal;
 
@@ -86,9 +86,8 @@ pub fn noise_checks(
         let equation = structure.equations().first().cloned().unwrap_or_default();
         return Err(InferenceError::TooFew { n_step: sums.n_step(), n_unknown: 0, equation });
     }
-    let part = |phi: &DMatrix<f64>| spread(structure, &posterior.active, &posterior.covariance, phi);
-    let squares = sums.residuals(&posterior.drift) + part(&sums.phi());
-    let lagged = sums.lagged_residuals(&posterior.drift) + part(&sums.lagged_phi());
+    let products = ResidualProducts::of(sums, structure, posterior);
+    let (squares, lagged) = (products.squares(), products.lagged());
     let (n, pairs) = (sums.n_step() as f64, sums.n_pair() as f64);
     let check = |(l, equation): (usize, &String)| {
         let shared = -lagged[(l, l)] / pairs;

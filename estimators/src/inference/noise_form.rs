@@ -3,9 +3,7 @@
 //! A form that holds less than there is leaves a bias in coefficients of the mid-point, whose ½ D V needs the D that there is, and intervals
 //! that are those of another noise. Read next: `fit.rs`, which can let V count with all that residuals share.
 
-use nalgebra::DMatrix;
-
-use super::normal::spread;
+use super::residual_products::ResidualProducts;
 use super::{Diffusion, InferenceError, Posterior, Structure, Sums, diffusion};
 use crate::quantiles::normal;
 
@@ -35,14 +33,16 @@ pub fn noise_form(
     if matches!(form, Diffusion::Full | Diffusion::Known(_)) || n < 2 {
         return Ok(Vec::new());
     }
-    let shown = shown(sums, structure, posterior);
+    let products = ResidualProducts::of(sums, structure, posterior).of_noise(!posterior.shares.is_empty());
+    let shown = diffusion::mean(sums, &products);
+    let degrees = |l: usize| posterior.degrees_of(l).map(|degrees| degrees / form.n_shared(n));
     let names = |i: usize, j: usize| [i, j].map(|l| structure.equations()[l].clone());
     let n_test = n * (n - 1) / 2 * if matches!(form, Diffusion::Isotropic) { 2 } else { 1 };
     let limit = normal(1.0 - 0.5 * by_chance / n_test as f64);
     let mut found = Vec::new();
     for i in 0..n {
         for j in 0..i {
-            let (Some(of_i), Some(of_j)) = (posterior.degrees_of(i), posterior.degrees_of(j)) else {
+            let (Some(of_i), Some(of_j)) = (degrees(i), degrees(j)) else {
                 continue;
             };
             let [d_i, d_j] = [shown[(i, i)], shown[(j, j)]];
@@ -64,15 +64,4 @@ pub fn noise_form(
     }
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
     Ok(found.into_iter().map(|(_, found)| found).collect())
-}
-
-/// D as the residuals have it, whatever the form.
-fn shown(sums: &Sums, structure: &Structure, posterior: &Posterior) -> DMatrix<f64> {
-    let part = |phi: &DMatrix<f64>| spread(structure, &posterior.active, &posterior.covariance, phi);
-    let mut products = sums.residuals(&posterior.drift) + part(&sums.phi());
-    if !posterior.shares.is_empty() && sums.n_pair() > 0 {
-        let lagged = sums.lagged_residuals(&posterior.drift) + part(&sums.lagged_phi());
-        products += (&lagged + lagged.transpose()) * (sums.n_step() as f64 / sums.n_pair() as f64);
-    }
-    diffusion::mean(sums, &products)
 }

@@ -101,28 +101,6 @@ impl<'a> Moments<'a> {
     }
 }
 
-/// Σ F_n cov F_mᵀ, L x L, for Σ φ_n φ_mᵀ of B x B: what the uncertainty of the coefficients adds to residuals.
-pub(crate) fn spread(
-    structure: &Structure,
-    active: &[usize],
-    covariance: &DMatrix<f64>,
-    phi: &DMatrix<f64>,
-) -> DMatrix<f64> {
-    let n = structure.equations().len();
-    let mut spread = DMatrix::zeros(n, n);
-    for (i, p) in active.iter().enumerate() {
-        for (j, q) in active.iter().enumerate() {
-            for a in &structure.coefficients()[*p].places {
-                for b in &structure.coefficients()[*q].places {
-                    spread[(a.equation, b.equation)] +=
-                        covariance[(i, j)] * a.factor * b.factor * phi[(a.function, b.function)];
-                }
-            }
-        }
-    }
-    spread
-}
-
 /// (D⁻¹ ⊗ A)⁻¹ = D ⊗ A⁻¹ for a precision of that form, of the functions that all of n equations share: one inverse of B x B instead
 /// of one of LB x LB.
 pub(crate) fn invert_shared(

@@ -245,3 +245,21 @@ fn a_bent_valley_is_followed_to_its_end() {
     let [a, b] = [fit.best().0[0], fit.best().0[1]];
     assert!((a - b - 8.0).abs() < 2e-3 && (a + b - 1.28).abs() < 2e-3, "{a} {b}");
 }
+
+#[test]
+fn what_is_held_stays_near_zero_or_where_it_stood_if_that_was_further() {
+    let fitted = |start: [f64; 2], within: Option<f64>| {
+        let mut fit = LeastSquares::new(DVector::from_row_slice(&start), flat(2), 1e-6, 100);
+        if let Some(within) = within {
+            fit.hold(1, within);
+        }
+        drive(&mut fit);
+        fit.best().0.clone()
+    };
+    assert!((fitted([1.0, 0.5], None)[0] - 2.0).abs() < 1e-3);
+    assert!((fitted([1.0, 0.5], Some(3.0))[0] - 2.0).abs() < 1e-3, "far enough");
+    let held = fitted([1.0, 0.5], Some(1.5));
+    assert!(held[0] <= 1.5 && held[0] > 1.49, "{held}");
+    let further = fitted([1.8, 0.5], Some(1.5));
+    assert!(further[0] <= 1.8 && further[0] > 1.79, "no further than it stood: {further}");
+}

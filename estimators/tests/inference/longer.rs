@@ -30,6 +30,19 @@ fn basis() -> Arc<Basis> {
     Arc::new(Basis::new(1, 0).with(Rule::LeftPoint, x).unwrap())
 }
 
+/// The settings that a study has by default, with this rate.
+fn by_default(rate: f64) -> Following {
+    Following {
+        block: 100,
+        recent: 1,
+        reference: Memory::Growing,
+        least: 1000,
+        longer: true,
+        rate,
+        watched: vec![],
+    }
+}
+
 fn detector(recent: usize, reference: Memory, rate: f64) -> Detector {
     let structure = Structure::same(&basis(), &["x"]).unwrap();
     let following =
@@ -82,15 +95,7 @@ fn a_constant_and_a_slope_in_blocks_as_short_as_the_memory_are_no_alarms() {
     let x = Function::new("x", |_, x| x[0], |_, _, slopes| slopes[0] = 1.0);
     let basis = Basis::new(1, 0).with(Rule::MidPoint, line).unwrap().with(Rule::MidPoint, x).unwrap();
     let structure = Structure::same(&basis, &["x"]).unwrap();
-    let following = Following {
-        block: 100,
-        recent: 1,
-        reference: Memory::Growing,
-        least: 1000,
-        longer: true,
-        rate: 0.01,
-        watched: vec![],
-    };
+    let following = by_default(0.01);
     let basis = Arc::new(basis);
     let (mut alarms, mut tests) = (0, 0);
     for seed in 0..20 {
@@ -132,15 +137,7 @@ fn watching() -> Detector {
     let basis = basis.with(Rule::MidPoint, coordinate("x", 0)).unwrap();
     let basis = Arc::new(basis.with(Rule::MidPoint, coordinate("v", 1)).unwrap());
     let structure = Structure::same(&basis, &["x", "v"]).unwrap();
-    let following = Following {
-        block: 100,
-        recent: 1,
-        reference: Memory::Growing,
-        least: 1000,
-        longer: true,
-        rate: 1e-6,
-        watched: vec![],
-    };
+    let following = by_default(1e-6);
     Detector::new(basis, H, structure, Fit::new(Diffusion::Full, 6), following).unwrap()
 }
 
@@ -170,8 +167,8 @@ fn false_alarms_of_all_lengths_together_are_as_rare_as_stated() {
     }
     let rate = f64::from(u32::try_from(alarms).unwrap()) / blocks as f64;
     println!("{alarms} of {blocks}: {rate:.4}");
-    // Tests of one time share their rows, and a little is added to the variance of each, so there are fewer; sd of about 0.001.
-    assert!((0.001..0.012).contains(&rate), "{rate}");
+    // Tests of one time share their rows, so there are fewer; sd of about 0.001.
+    assert!((0.003..0.012).contains(&rate), "{rate}");
 }
 
 /// To the last bit after any block, and not with a state that has no longer stretches.

@@ -20,6 +20,7 @@ mod miss;
 mod missing;
 mod mixing;
 mod motor;
+mod noise_form;
 mod properties;
 mod robust;
 mod tanks;
