@@ -93,13 +93,7 @@ pub(crate) fn search<'c>(
         searcher.cache.foreseen.goes(Course::Open);
         searcher.replace_terms(&mut found)?;
         searcher.second_pass(&mut found, options)?;
-        let is_open = searcher.is_open(&found)?;
-        if options.max_effects > 1 && (is_open || is_a_pair_that_leaves_more(&found)) {
-            let known: Vec<String> = found.judged.iter().map(|j| j.fit.variant.name()).collect();
-            searcher.refit_pairs(&mut found)?;
-            if !is_open {
-                found.judged.retain(|j| known.contains(&j.fit.variant.name()) || leaves_noise(j));
-            }
+        if options.max_effects > 1 && searcher.refit_pairs_where_open(&mut found)? {
             searcher.second_pass(&mut found, options)?;
         }
     }
@@ -178,6 +172,22 @@ impl<'c> Searcher<'_, '_, 'c> {
     pub(super) fn is_open(&self, found: &SearchResult<'c>) -> Result<bool, ExplainError> {
         Ok(found.passing().is_empty()
             || decide(self.cache, found, self.candidates)?.verdict == Verdict::Unexplained)
+    }
+
+    /// Refits pairs where nothing would be named, and others where a pair would be that leaves more than noise: those count only if they leave
+    /// nothing else. Says whether it did.
+    fn refit_pairs_where_open(&mut self, found: &mut SearchResult<'c>) -> Result<bool, ExplainError> {
+        if self.is_open(found)? {
+            self.refit_pairs(found)?;
+            return Ok(true);
+        }
+        if !is_a_pair_that_leaves_more(found) {
+            return Ok(false);
+        }
+        let known: Vec<String> = found.judged.iter().map(|j| j.fit.variant.name()).collect();
+        self.refit_pairs(found)?;
+        found.judged.retain(|j| known.contains(&j.fit.variant.name()) || leaves_noise(j));
+        Ok(true)
     }
 
     /// Takes the scores of further candidates into a search, whose chance is then that of all of them.
