@@ -34,6 +34,8 @@ fn a_recording_out_of_step_is_refused_with_its_line() {
 #[test]
 fn what_cannot_be_estimated_is_refused_with_names() {
     let data = recording(2000, usize::MAX);
+    let reduced = "[infer.reduced]\nstart = { a = 1.0, b = 1.0, e = 1.0, f = 1.0 }\ncoefficients = { k = \"a*b*e*f\" }\n";
+    refused(&format!("{STUDY}\n{reduced}"), &data, &["cannot determine 4 unknowns"]);
     let of_functions = |functions: &str| STUDY.replace(r#"parameters = ["k", "c", "d"]"#, functions);
     let collinear = of_functions(r#"functions = ["x", "z", "2*x - z"]"#);
     refused(&collinear, &data, &["cannot tell these terms apart", "x:2*x - z", "x:x"]);
@@ -118,6 +120,7 @@ fn keys_that_do_not_fit_together_are_refused_before_anything_is_read() {
     let functions = STUDY.replace(r#"parameters = ["k", "c", "d"]"#, r#"functions = ["x"]"#);
     let cases = [
         (format!("{STUDY}{reduced}"), "there is no coefficient `kk`"),
+        (functions.replace("[\"x\"]", "[\"yy\"]"), "a function reads states, inputs, outputs and constants"),
         (with("measurement_noise = 0.1\nrichardson = true"), "remove `richardson`"),
         (with("measurement_noise = 0.1\ngaps = \"break\""), "remove gaps"),
         (format!("{functions}{nothing}"), "names no term that the model has not already"),

@@ -11,7 +11,7 @@ use std::fs;
 
 use access_kit::{Started, listening};
 use common::{output, starlings};
-use infer_kit::{STUDY, folder, infer, recording, refused};
+use infer_kit::{STUDY, folder, infer, recording, refused, said};
 
 #[test]
 fn one_two_and_three_workers_give_the_same_bytes() {
@@ -136,6 +136,11 @@ fn a_known_error_of_the_measurement_is_smoothed_where_the_recording_itself_has_n
     let noise = found["diffusion"]["matrix"][0][0].as_f64().unwrap();
     // 2 M/h of the raw residuals is 50, and D is a quarter.
     assert!(noise < 5.0, "{noise}");
+    // Without a fit neighbouring differences say how large the errors are.
+    assert_eq!(said(&found, "is not what neighbouring rows show"), Vec::<&str>::new());
+    let dir = folder(&STUDY.replace("block = 300", "measurement_noise = 0.8"), &data);
+    let found = infer(dir.path(), "out", "2");
+    assert_eq!(said(&found, "is not what neighbouring rows show in x (0.4").len(), 1, "{found}");
 }
 
 #[test]

@@ -8,36 +8,8 @@ mod infer_kit;
 use std::fmt::Write as _;
 
 use common::{output, starlings};
-use infer_kit::{STUDY, folder, infer, noise, recording, refused};
+use infer_kit::{STUDY, by_rates, folder, infer, noise, recording, refused, said};
 use serde_json::Value;
-
-/// Warnings that hold these words.
-fn said<'a>(found: &'a Value, words: &str) -> Vec<&'a str> {
-    let all = found["warnings"].as_array().unwrap().iter().map(|warning| warning.as_str().unwrap());
-    all.filter(|warning| warning.contains(words)).collect()
-}
-
-/// A study of one state by its rate, whose parameters are asked for.
-fn one_state(rate: &str, parameters: &str) -> String {
-    format!(
-        r#"
-[study]
-name = "path"
-[model]
-kind = "equations"
-outputs = [ {{ name = "x", value = "x" }} ]
-[[model.states]]
-name = "x"
-rate = "{rate}"
-[infer]
-parameters = {parameters}
-[[records]]
-name = "path"
-file = "data.csv"
-channels = [ {{ column = "x", output = "x" }} ]
-"#
-    )
-}
 
 /// Mean and standard deviation of the coefficient of this name.
 fn value(found: &Value, name: &str) -> [f64; 2] {
@@ -101,7 +73,7 @@ fn a_prior_that_the_data_contradict_is_told() {
 #[test]
 fn what_noise_makes_of_a_coarse_step_is_told_of_a_long_recording_too() {
     // A decay of rate 5 in steps of a quarter of its time, as it moves from row to row without any error.
-    let study = one_state("-a*x", r#"["a"]"#);
+    let study = by_rates(&[("x", "-a*x")], r#"parameters = ["a"]"#);
     let path = |step: f64, n: usize| {
         let (mut noise, keeps) = (noise(7), (-5.0 * step).exp());
         let (mut x, mut text) = (0.0, "time,x\n".to_owned());
@@ -148,7 +120,7 @@ fn bistable(size: impl Fn(f64) -> f64) -> String {
 
 #[test]
 fn noise_that_depends_on_the_state_is_told_with_intervals_that_hold_and_constant_noise_is_not() {
-    let study = one_state("a*x - b*x^3", r#"["a", "b"]"#);
+    let study = by_rates(&[("x", "a*x - b*x^3")], r#"parameters = ["a", "b"]"#);
     let steady = infer(folder(&study, &bistable(|_| 0.6)).path(), "out", "2");
     assert_eq!(said(&steady, "not constant"), Vec::<&str>::new());
     assert_eq!((&steady["noise_varies"], &steady["robust"]), (&Value::Null, &Value::Null));

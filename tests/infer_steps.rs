@@ -6,7 +6,7 @@ mod common;
 mod infer_kit;
 
 use common::{output, starlings};
-use infer_kit::{STUDY, folder, infer, recording};
+use infer_kit::{STUDY, folder, infer, recording, said};
 use serde_json::Value;
 
 /// Every so many rows of a recording.
@@ -16,8 +16,7 @@ fn every(n: usize, data: &str) -> String {
 }
 
 fn coarse(found: &Value) -> Vec<&str> {
-    let said = found["warnings"].as_array().unwrap().iter().map(|warning| warning.as_str().unwrap());
-    said.filter(|warning| warning.contains("coarse for this dynamics")).collect()
+    said(found, "coarse for this dynamics")
 }
 
 #[test]
@@ -26,16 +25,19 @@ fn steps_that_are_coarse_for_the_dynamics_are_told_with_the_remedy_and_fine_ones
     let data = recording(400_000, usize::MAX);
     let fine = infer(folder(STUDY, &data).path(), "out", "2");
     assert_eq!(coarse(&fine), Vec::<&str>::new());
+    let extrapolated = STUDY.replace("block = 300", "block = 300\nrichardson = true");
+    let short = infer(folder(&extrapolated, &recording(10_000, usize::MAX)).path(), "out", "2");
+    assert_eq!(said(&short, "moves coefficients far"), Vec::<&str>::new());
     let rows = every(6, &data);
     let dir = folder(STUDY, &rows);
     let found = infer(dir.path(), "out", "2");
-    let said = coarse(&found);
-    assert!(said.len() == 1 && said[0].starts_with("steps of 0.06 s are coarse"), "{found}");
-    assert!(said[0].contains("`richardson = true` in [infer]"), "{said:?}");
+    let told = coarse(&found);
+    assert!(told.len() == 1 && told[0].starts_with("steps of 0.06 s are coarse"), "{found}");
+    assert!(told[0].contains("`richardson = true` in [infer]"), "{told:?}");
     // What it asks for moves estimates towards the rates of the path and ends the warning.
-    let study = STUDY.replace("block = 300", "block = 300\nrichardson = true");
-    let mended = infer(folder(&study, &rows).path(), "out", "2");
+    let mended = infer(folder(&extrapolated, &rows).path(), "out", "2");
     assert_eq!(coarse(&mended), Vec::<&str>::new());
+    assert_eq!(said(&mended, "the extrapolation to no step moves coefficients far").len(), 1, "{mended}");
     let c = |of: &Value| of["coefficients"][1]["estimate"].as_f64().unwrap();
     let of_path = c(&fine);
     assert!((c(&mended) - of_path).abs() < 0.7 * (c(&found) - of_path).abs(), "{of_path} {mended} {found}");
@@ -47,13 +49,13 @@ fn steps_so_coarse_that_longer_ones_have_no_fit_are_told_by_what_is_left_to_comp
     let of = |every_so: usize| infer(folder(STUDY, &every(every_so, &data)).path(), "out", "1");
     // Of the rate 3 two tenths of whose time are a step: at 4 steps there is no fit, at 2 there is.
     let found = of(10);
-    let said = coarse(&found);
-    assert!(said.len() == 1 && said[0].contains("four times the step has no fit"), "{found}");
-    assert!(said[0].contains("k by -") && said[0].contains("at least"), "{said:?}");
+    let told = coarse(&found);
+    assert!(told.len() == 1 && told[0].contains("four times the step has no fit"), "{found}");
+    assert!(told[0].contains("k by -") && told[0].contains("at least"), "{told:?}");
     // At 2 steps there is none: a step is half the fastest time of the drift.
     let found = of(15);
-    let said = coarse(&found);
-    assert!(said.len() == 1 && said[0].contains("a step is 0.5 times the fastest time"), "{found}");
+    let told = coarse(&found);
+    assert!(told.len() == 1 && told[0].contains("a step is 0.5 times the fastest time"), "{found}");
     // At the step itself there is none.
     let dir = folder(STUDY, &every(40, &data));
     let (code, _, stderr) = output(starlings().current_dir(dir.path()).args(["infer", "study.toml"]));

@@ -111,3 +111,25 @@ pub(crate) fn followed(dir: &Path, data: &str, arguments: &[&str]) -> (i32, Vec<
     let lines = String::from_utf8(out.stdout).unwrap().lines().map(str::to_owned).collect();
     (out.status.code().unwrap(), lines, String::from_utf8(out.stderr).unwrap())
 }
+
+/// Warnings that hold these words.
+pub(crate) fn said<'a>(found: &'a Value, words: &str) -> Vec<&'a str> {
+    let all = found["warnings"].as_array().unwrap().iter().map(|warning| warning.as_str().unwrap());
+    all.filter(|warning| warning.contains(words)).collect()
+}
+
+/// A study of states by their rates, whose parameters are asked for.
+pub(crate) fn by_rates(states: &[(&str, &str)], infer: &str) -> String {
+    let mut text = "[study]\nname = \"path\"\n[model]\nkind = \"equations\"\n".to_owned();
+    let list = |each: &dyn Fn(&str) -> String| {
+        states.iter().map(|(name, _)| each(name)).collect::<Vec<_>>().join(", ")
+    };
+    writeln!(text, "outputs = [ {} ]", list(&|x| format!("{{ name = \"{x}\", value = \"{x}\" }}"))).unwrap();
+    for (name, rate) in states {
+        writeln!(text, "[[model.states]]\nname = \"{name}\"\nrate = \"{rate}\"").unwrap();
+    }
+    writeln!(text, "[infer]\n{infer}\n[[records]]\nname = \"path\"\nfile = \"data.csv\"").unwrap();
+    let columns = list(&|x| format!("{{ column = \"{x}\", output = \"{x}\" }}"));
+    writeln!(text, "channels = [ {columns} ]").unwrap();
+    text
+}

@@ -5,7 +5,7 @@
 use nalgebra::{DMatrix, DVector};
 use starlings_estimators::inference::{
     Basis, Diffusion, Estimate, Extrapolated, Fit, InferenceError, NoiseCheck, NoiseForm, Posterior, Prior,
-    Strength, Structure, Sums, extrapolate,
+    Strength, Structure, Sums, Verdict, extrapolate,
 };
 use starlings_study::infer_choice::{DiffusionChoice, InferChoice, MeasuredChoice};
 
@@ -70,10 +70,8 @@ pub(crate) fn coefficient(
 pub(crate) struct Answer {
     pub(crate) posterior: Posterior,
     pub(crate) checks: Vec<NoiseCheck>,
-    /// Whether errors of the measurement were taken out of the noise.
-    pub(crate) lag_corrected: bool,
-    /// Whether V counts with all that the residuals share.
-    pub(crate) whole_in_jacobian: bool,
+    /// How it was made.
+    pub(crate) fit: Fit,
     /// In what the noise has not the form that the study holds it to have.
     pub(crate) departs: Vec<NoiseForm>,
     pub(crate) extrapolated: Option<Extrapolated>,
@@ -109,24 +107,7 @@ impl Answer {
             Ok(extrapolated) => (extrapolated, Vec::new()),
             Err(doubt) => (None, vec![doubt]),
         };
-        let Fit { lag_corrected, whole_in_jacobian, .. } = fit;
-        let constant = None;
-        Ok(Self {
-            posterior,
-            checks,
-            lag_corrected,
-            whole_in_jacobian,
-            departs,
-            extrapolated,
-            doubts,
-            constant,
-        })
-    }
-
-    /// The fit by which it was made.
-    pub(crate) fn fit(&self, asked: &Fit) -> Fit {
-        let Self { lag_corrected, whole_in_jacobian, .. } = *self;
-        Fit { lag_corrected, whole_in_jacobian, ..asked.clone() }
+        Ok(Self { posterior, checks, fit, departs, extrapolated, doubts, constant: None })
     }
 
     /// The posterior from a smoothed path, where the standard deviation of the measurement is known. The recording as it was measured
@@ -153,16 +134,13 @@ impl Answer {
         let found = smoothed(question, fit, &choice.records, cut, sd, teller)?;
         let doubts = not_converged(found.converged, found.log_likelihood.len()).into_iter().collect();
         let posterior = found.posterior;
-        Ok(Self {
-            posterior,
-            checks,
-            lag_corrected: false,
-            whole_in_jacobian: false,
-            departs: Vec::new(),
-            extrapolated: None,
-            doubts,
-            constant: None,
-        })
+        let fit = fit.clone();
+        Ok(Self { posterior, checks, fit, departs: Vec::new(), extrapolated: None, doubts, constant: None })
+    }
+
+    /// Whether errors of the measurement matter, or were taken out.
+    pub(crate) fn has_errors(&self) -> bool {
+        self.fit.lag_corrected || self.checks.iter().any(|check| check.verdict == Verdict::Matters)
     }
 
     /// Takes a posterior that holds for noise of any size, told from so many of all steps.
@@ -236,7 +214,7 @@ impl Answer {
             ),
             interval90: (0..n).map(|l| self.posterior.diffusion_interval(l, LEVEL)).collect(),
             degrees: self.posterior.least_degrees(),
-            lag_corrected: self.lag_corrected,
+            lag_corrected: self.fit.lag_corrected,
             measured_sd: if let MeasuredChoice::Known(sd) = choice.measured { Some(sd) } else { None },
         }
     }

@@ -3,14 +3,13 @@
 //! They are read here, whoever reads the recording: a few milliseconds, whatever its length. Next file to read: `words.rs`, which says it.
 
 use starlings_estimators::inference::{
-    Decimation, Fit, InferenceError, StepError, Sums, Verdict, noise_errors, step_errors, step_in_rates,
+    Decimation, InferenceError, StepError, Sums, noise_errors, step_errors, step_in_rates,
 };
 use starlings_study::infer_choice::MeasuredChoice;
 
 use crate::answer::Answer;
 use crate::blocks::{Blocks, Cut, Start, open};
 use crate::error::InferError;
-use crate::noise_words::alike;
 use crate::result::LEVEL;
 use crate::run::Asked;
 
@@ -36,25 +35,15 @@ pub(crate) enum Coarse {
     Fast(f64),
 }
 
-/// Looks whether steps are coarse; `None` where they are not, where errors of the measurement, a memory of the noise or an interpolation hide it, or where the study
+/// Looks whether steps are coarse; `None` where they are not, where errors of the measurement or an interpolation hide it, or where the study
 /// extrapolates.
-pub(crate) fn coarse(
-    asked: &Asked<'_>,
-    fit: &Fit,
-    answer: &Answer,
-    sums: &Sums,
-    cut: Cut,
-    at: Start,
-) -> Option<Coarse> {
+pub(crate) fn coarse(asked: &Asked<'_>, answer: &Answer, sums: &Sums, cut: Cut, at: Start) -> Option<Coarse> {
     let choice = asked.choice;
-    let is_noisy =
-        answer.lag_corrected || answer.checks.iter().any(|check| check.verdict == Verdict::Matters);
-    let is_noisy = is_noisy || !alike(&answer.checks, &asked.question.structure).is_empty();
     let is_known = matches!(choice.measured, MeasuredChoice::Known(_));
-    if choice.sums.levels > 1 || choice.resample || is_known || is_noisy {
+    if choice.sums.levels > 1 || choice.resample || is_known || answer.has_errors() {
         return None;
     }
-    let found = pieces(asked, cut, at).ok().and_then(|pieces| compared(asked, fit, answer, sums, &pieces));
+    let found = pieces(asked, cut, at).ok().and_then(|pieces| compared(asked, answer, sums, &pieces));
     // The first rows alone know coefficients less well than a long recording.
     let by_noise = || {
         let moved = noise_errors(sums, &asked.question.structure, &answer.posterior, LEVEL);
@@ -64,15 +53,9 @@ pub(crate) fn coarse(
 }
 
 /// What longer steps of the first rows say.
-fn compared(
-    asked: &Asked<'_>,
-    fit: &Fit,
-    answer: &Answer,
-    sums: &Sums,
-    pieces: &[[Sums; 3]],
-) -> Option<Coarse> {
+fn compared(asked: &Asked<'_>, answer: &Answer, sums: &Sums, pieces: &[[Sums; 3]]) -> Option<Coarse> {
     let structure = &asked.question.structure;
-    let errors = |n_level| step_errors(pieces, n_level, fit, structure, &answer.posterior, LEVEL);
+    let errors = |n_level| step_errors(pieces, n_level, &answer.fit, structure, &answer.posterior, LEVEL);
     match errors(3) {
         Ok(moved) => return (!moved.is_empty()).then_some(Coarse::Moved(moved)),
         Err(InferenceError::Shape { .. }) => return None,

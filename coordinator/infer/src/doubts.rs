@@ -2,7 +2,7 @@
 //!
 //! Next files to read: `coarse.rs`, `varying.rs`, `constancy.rs`.
 
-use starlings_estimators::inference::{Fit, NoiseCheck};
+use starlings_estimators::inference::NoiseCheck;
 use starlings_study::infer_choice::{InferChoice, MeasuredChoice};
 
 use crate::answer::Answer;
@@ -10,10 +10,11 @@ use crate::blocks::{Cut, Start};
 use crate::coarse::{Coarse, coarse};
 use crate::constancy::Changed;
 use crate::gather::Gathered;
+use crate::noise_words::{self, alike};
 use crate::result::NoiseVaries;
 use crate::run::Asked;
 use crate::varying::{said, varies};
-use crate::{noise_words, words};
+use crate::words;
 
 /// What was found.
 pub(crate) struct Doubts {
@@ -30,33 +31,30 @@ impl Doubts {
     /// Looks at the recordings that an answer is of. Its intervals hold noise that varies from here on.
     pub(crate) fn of(
         asked: &Asked<'_>,
-        fit: &Fit,
         answer: &mut Answer,
         gathered: &Gathered,
         (cut, at): (Cut, Start),
     ) -> Self {
         let (choice, structure) = (asked.choice, &asked.question.structure);
-        let coarse = gathered.levels.first().and_then(|sums| coarse(asked, fit, answer, sums, cut, at));
-        let varies = varies(asked, fit, answer, gathered, coarse.is_some());
+        let sums = gathered.levels.first();
         // What an interpolation leaves in neighbouring residuals is taken out.
-        let alike: Vec<NoiseCheck> = if choice.resample {
-            Vec::new()
-        } else {
-            noise_words::alike(&answer.checks, structure).into_iter().cloned().collect()
-        };
+        let alike: Vec<NoiseCheck> =
+            if choice.resample { Vec::new() } else { alike(&answer.checks, structure).cloned().collect() };
+        // A memory of the noise feigns all of these.
+        let is_white = alike.is_empty();
+        let coarse = sums.filter(|_| is_white).and_then(|sums| coarse(asked, answer, sums, cut, at));
+        let varies = if is_white { varies(asked, answer, gathered, coarse.is_some()) } else { Vec::new() };
         let given = match choice.measured {
-            MeasuredChoice::Known(sd) => {
-                noise_words::of_given(sd, &answer.checks, gathered.levels.first(), structure)
-            }
+            MeasuredChoice::Known(sd) => noise_words::of_given(sd, &answer.checks, sums, structure),
             _ => None,
         };
         // Rows that were interpolated or hold large errors share them, which the test of a change takes for independent.
         let is_plain = !choice.resample
             && choice.prefactor
-            && !answer.lag_corrected
-            && alike.is_empty()
+            && !answer.fit.lag_corrected
+            && is_white
             && !matches!(choice.measured, MeasuredChoice::Known(_));
-        let changed = is_plain.then(|| gathered.stretches.changed(fit, structure)).flatten();
+        let changed = is_plain.then(|| gathered.stretches.changed(&answer.fit, structure)).flatten();
         Self { coarse, varies, changed: changed.filter(|changed| changed.shows(answer)), alike, given }
     }
 
@@ -66,7 +64,7 @@ impl Doubts {
         let name = |changed: &Changed| choice.records[changed.record].name.clone();
         let changed = self.changed.as_ref().map(|changed| words::of_change(changed, &name(changed), unit));
         let of_noise = [
-            noise_words::of_memory(&self.alike.iter().collect::<Vec<_>>(), cut.step, unit),
+            noise_words::of_memory(&self.alike, cut.step, unit),
             noise_words::of_form(&answer.diffusion(choice).form, answer),
             self.given.clone(),
             noise_words::of_extrapolation(answer),

@@ -15,23 +15,30 @@ const SURELY: f64 = 3.0;
 const OTHER: f64 = 1.25;
 /// Standard deviations of a coefficient from which an extrapolation went far.
 const FAR: f64 = 1.0;
+/// Share of the variance of neighbouring differences that makes errors of the measurement large: without a fit, smaller ones are uncertain.
+const LARGE: f64 = 0.5;
+/// Equations or coefficients that a warning names at most.
+const NAMED: usize = 4;
 
 /// Equations with something to infer in which neighbouring residuals are alike.
-pub(crate) fn alike<'a>(checks: &'a [NoiseCheck], structure: &Structure) -> Vec<&'a NoiseCheck> {
-    let is_asked = |l: usize| {
+pub(crate) fn alike<'a>(
+    checks: &'a [NoiseCheck],
+    structure: &Structure,
+) -> impl Iterator<Item = &'a NoiseCheck> {
+    let is_asked = move |l: usize| {
         let at = |place: &Place| place.equation == l;
         structure.coefficients().iter().any(|c| c.places.iter().any(at))
     };
     let all = checks.iter().enumerate();
-    all.filter(|(l, check)| check.verdict == Verdict::Alike && is_asked(*l)).map(|(_, check)| check).collect()
+    all.filter(move |(l, check)| check.verdict == Verdict::Alike && is_asked(*l)).map(|(_, check)| check)
 }
 
 /// That the noise has a memory.
-pub(crate) fn of_memory(alike: &[&NoiseCheck], step: f64, unit: &str) -> Option<String> {
+pub(crate) fn of_memory(alike: &[NoiseCheck], step: f64, unit: &str) -> Option<String> {
     if alike.is_empty() {
         return None;
     }
-    let of = |check: &&NoiseCheck| {
+    let of = |check: &NoiseCheck| {
         let memory = check.memory().map_or_else(String::new, |steps| {
             format!(", a memory of about {} {unit}", rounded(steps * step, 2))
         });
@@ -56,7 +63,7 @@ pub(crate) fn of_form(form: &str, answer: &Answer) -> Option<String> {
             format!("{a} has {} and {b} {}", rounded(*d_a, 3), rounded(*d_b, 3))
         }
     };
-    let list: Vec<String> = answer.departs.iter().take(4).map(of).collect();
+    let list: Vec<String> = answer.departs.iter().take(NAMED).map(of).collect();
     (!list.is_empty()).then(|| {
         format!(
             "the noise of the equations is not what diffusion = \"{form}\" holds it to be: {}; means of coefficients are freed of that, intervals \
@@ -82,7 +89,7 @@ pub(crate) fn of_given(
     };
     let by_differences = || {
         let all = sums.map(|sums| increment_noise(sums, structure)).unwrap_or_default();
-        let hidden = all.into_iter().filter(|noise| noise.share > 0.5 && is_other(noise.measured));
+        let hidden = all.into_iter().filter(|noise| noise.share > LARGE && is_other(noise.measured));
         hidden.map(|noise| format!("{} ({})", noise.equation, rounded(noise.measured, 2))).collect()
     };
     let list: Vec<String> =
@@ -105,7 +112,7 @@ pub(crate) fn of_extrapolation(answer: &Answer) -> Option<String> {
         is_far.then(|| format!("{name} by {:.1}", (to.mean - at.mean) / at.sd))
     };
     let Posterior { estimates, .. } = &answer.posterior;
-    let list: Vec<String> = estimates.iter().zip(&to.estimates).filter_map(far).take(4).collect();
+    let list: Vec<String> = estimates.iter().zip(&to.estimates).filter_map(far).take(NAMED).collect();
     (!list.is_empty()).then(|| {
         format!(
             "the extrapolation to no step moves coefficients far, {} of their standard deviations: what is left of the step's error may be as \

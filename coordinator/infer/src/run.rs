@@ -73,11 +73,10 @@ pub fn infer(
         MeasuredChoice::Known(sd) => Answer::smoothed(&asked, cut, sd, &gathered.levels, &mut teller)?,
         _ => Answer::of(choice, &asked.fit, structure, (&asked.question.basis, &gathered))?,
     };
-    let fit = answer.fit(&asked.fit);
-    let missing = missing(&asked, &fit, &gathered, cut, fleet, (reader, &mut teller))?;
+    let missing = missing(&asked, &answer.fit, &gathered, cut, fleet, (reader, &mut teller))?;
     teller.posterior();
-    let convergence = convergence.finish(&fit, structure, &gathered);
-    let doubts = Doubts::of(&asked, &fit, &mut answer, &gathered, (cut, at));
+    let convergence = convergence.finish(&answer.fit, structure, &gathered);
+    let doubts = Doubts::of(&asked, &mut answer, &gathered, (cut, at));
     let beside = Beside { convergence, missing, doubts };
     told_of(study, &asked, &gathered, &answer, cut, beside)
 }

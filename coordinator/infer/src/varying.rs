@@ -3,7 +3,7 @@
 //! The test and the intervals are the estimators' (`estimators/src/inference/varying.rs` and `robust.rs` beside it), by pairs of steps that
 //! the blocks bring along. Next file to read: `doubts.rs`, which asks, and says what it finds beside other doubts.
 
-use starlings_estimators::inference::{Fit, Varying, Verdict, With, varying};
+use starlings_estimators::inference::{Varying, With, varying};
 use starlings_models::units::rounded;
 use starlings_study::infer_choice::{InferChoice, MeasuredChoice};
 
@@ -22,7 +22,6 @@ const HIDDEN: f64 = 1.5;
 /// measurement make neighbouring residuals one another's, or where the coefficients were extrapolated.
 pub(crate) fn varies(
     asked: &Asked<'_>,
-    fit: &Fit,
     answer: &mut Answer,
     gathered: &Gathered,
     is_coarse: bool,
@@ -32,8 +31,7 @@ pub(crate) fn varies(
     if choice.resample || matches!(choice.measured, MeasuredChoice::Known(_)) {
         return Vec::new();
     }
-    let is_noisy =
-        answer.lag_corrected || answer.checks.iter().any(|check| check.verdict == Verdict::Matters);
+    let is_noisy = answer.has_errors();
     let (basis, structure) = (&question.basis, &question.structure);
     let found = varying(pairs, basis, answer.posterior.drift(), sums.step(), FALSE_ALARM);
     let is_told = |found: &Varying| found.ratio > HIDDEN || !(is_coarse || is_noisy);
@@ -41,7 +39,7 @@ pub(crate) fn varies(
     if !told.is_empty()
         && !is_noisy
         && answer.extrapolated.is_none()
-        && let Ok(robust) = fit.robust(&answer.posterior, pairs, (basis, structure), sums.step())
+        && let Ok(robust) = answer.fit.robust(&answer.posterior, pairs, (basis, structure), sums.step())
     {
         answer.take_robust(robust, (2 * pairs.n_pair() as u64, sums.n_step()));
     }

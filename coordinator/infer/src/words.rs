@@ -80,7 +80,7 @@ pub(crate) fn conditional_on(choice: &InferChoice, answer: &Answer) -> String {
         _ if choice.resample => {
             "at rows that were interpolated to equal steps, whose effect on the functions they do not hold".to_owned()
         }
-        _ if answer.lag_corrected => {
+        _ if answer.fit.lag_corrected => {
             "with the noise freed of errors of the measurement, whose effect on the functions they do not hold".to_owned()
         }
         _ => "without errors of the measurement".to_owned(),
@@ -227,8 +227,9 @@ fn listed(moved: &[StepError]) -> String {
 
 /// Errors of the measurement; small ones where they moved coefficients.
 fn of_errors(choice: &InferChoice, answer: &Answer) -> Option<String> {
-    let is_told =
-        |check: &&NoiseCheck| check.verdict == Verdict::Matters || (answer.lag_corrected && check.is_sure());
+    let is_told = |check: &&NoiseCheck| {
+        check.verdict == Verdict::Matters || (answer.fit.lag_corrected && check.is_sure())
+    };
     let of = |check: &NoiseCheck| {
         format!(
             "{} (ratio {:.3}, standard deviation about {:.2e})",
@@ -241,7 +242,7 @@ fn of_errors(choice: &InferChoice, answer: &Answer) -> Option<String> {
     if list.is_empty() || matches!(choice.measured, MeasuredChoice::Known(_)) {
         return None;
     }
-    let done = if answer.lag_corrected {
+    let done = if answer.fit.lag_corrected {
         "the noise was taken from neighbouring residuals, which frees it of them"
     } else {
         "measurement_noise = \"auto\" takes them out of the noise"

@@ -117,18 +117,15 @@ fn check_functions(
                 }
             }
             SetupError::Expression { place, expression, column, message } => {
-                let span = listed
-                    .clone()
-                    .find(|p| *p.get_ref() == expression)
-                    .map_or(section.span.clone(), Spanned::span);
+                let function = listed.clone().find(|p| *p.get_ref() == expression).map(Spanned::span);
                 let message = format!("in the {place} (`{expression}`, column {column}): {message}");
                 // A function that the study writes has no coefficient inside.
-                let help = if place.starts_with("function") {
+                let help = if function.is_some() {
                     "a function reads states, inputs, outputs and constants"
                 } else {
                     "coefficients are inferred where the rates are linear in them; give other parameters as constants"
                 };
-                source.report_with(span, message, help);
+                source.report_with(function.unwrap_or(section.span.clone()), message, help);
             }
             other => source.report(section.span.clone(), other.to_string()),
         }
