@@ -111,7 +111,7 @@ impl Fit {
             let pass = self.pass(&moments, &noise)?;
             let drift = structure.matrix(&pass.active, pass.mean.as_slice());
             if let Diffusion::Known(_) = self.diffusion {
-                return self.finish(&moments, sums, pass, noise, passes);
+                return self.finish(&moments, sums, pass, &noise, passes);
             }
             self.enough(sums, &moments, &pass.active)?;
             let products = pass.products(sums, structure, &drift).of_noise(self.lag_corrected);
@@ -126,7 +126,7 @@ impl Fit {
             }
             noise = next;
             if settled {
-                return self.finish(&moments, sums, pass, noise, passes);
+                return self.finish(&moments, sums, pass, &noise, passes);
             }
         }
         Err(InferenceError::NotSettled { passes: PASSES })
@@ -180,7 +180,7 @@ impl Fit {
         moments: &Moments<'_>,
         sums: &Sums,
         pass: Pass,
-        noise: Noise,
+        noise: &Noise,
         passes: usize,
     ) -> Result<Posterior, InferenceError> {
         let structure = moments.structure;
@@ -198,7 +198,7 @@ impl Fit {
             covariance: pass.covariance,
             precision: pass.precision,
         };
-        self.widen(moments, &noise, &mut found)?;
+        self.widen(moments, noise, &mut found)?;
         if found.covariance.diagonal().iter().any(|v| !v.is_finite() || *v <= 0.0) {
             return Err(InferenceError::Overflow { what: "the variance of a coefficient" });
         }
