@@ -9,6 +9,9 @@ import time
 
 import websocket
 
+# How often a picture is asked for, and how long one may take.
+PICTURE_TRIES, PICTURE_SECONDS = 4, 20
+
 
 class Browser:
     """The browser's process and the one connection to it."""
@@ -25,20 +28,26 @@ class Browser:
         self.socket = websocket.create_connection(f"ws://127.0.0.1:{port}{path}", timeout=60)
         self.number, self.events = 0, []
 
-    def send(self, method, session=None, **params):
-        """Asks and waits for the answer; events that come meanwhile are kept."""
+    def send(self, method, session=None, seconds=60, **params):
+        """Asks and waits for the answer; events that come meanwhile are kept, and what nobody waits for any more is not."""
         self.number += 1
         message = {"id": self.number, "method": method, "params": params}
         if session:
             message["sessionId"] = session
         self.socket.send(json.dumps(message))
+        end = time.monotonic() + seconds
         while True:
-            answer = json.loads(self.socket.recv())
+            self.socket.settimeout(max(0.01, end - time.monotonic()))
+            try:
+                answer = json.loads(self.socket.recv())
+            except websocket.WebSocketTimeoutException:
+                raise TimeoutError(f"{method} has no answer after {seconds} s") from None
             if answer.get("id") == self.number:
                 if "error" in answer:
                     raise RuntimeError(f"{method}: {answer['error']}")
                 return answer["result"]
-            self.events.append(answer)
+            if "method" in answer:
+                self.events.append(answer)
 
     def close(self):
         self.process.terminate()
@@ -104,13 +113,24 @@ class Page:
             self.send("Input.dispatchKeyEvent", type=kind, key=name, code=name, windowsVirtualKeyCode=code, **text)
 
     def picture(self, path, whole=False):
-        """Keeps what is seen, or the whole page."""
+        """Keeps what is seen, or the whole page. A picture of a page that changes while it is taken may wait for ever: it is asked for again."""
+        for left in reversed(range(PICTURE_TRIES)):
+            try:
+                self.send("Page.bringToFront")
+                data = self.capture(whole)
+                break
+            except TimeoutError:
+                if not left:
+                    raise
+        pathlib.Path(path).write_bytes(base64.b64decode(data))
+
+    def capture(self, whole):
+        """The picture, in base64."""
         clip = {}
         if whole:
             size = self.send("Page.getLayoutMetrics")["cssContentSize"]
             clip = {"captureBeyondViewport": True, "clip": {"x": 0, "y": 0, "width": self.width, "height": min(size["height"], 8000), "scale": 1}}
-        data = self.send("Page.captureScreenshot", format="png", **clip)["data"]
-        pathlib.Path(path).write_bytes(base64.b64decode(data))
+        return self.send("Page.captureScreenshot", seconds=PICTURE_SECONDS, format="png", **clip)["data"]
 
     def faults(self, own=("file:", "data:", "blob:", "about:")):
         """Errors on the console, and requests to anywhere else than the page's own address."""

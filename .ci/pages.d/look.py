@@ -2,9 +2,10 @@
 
 Usage: look.py PROGRAM PICTURES [DOCS]. Checked: values under the pointer are those of the store; the legend hides, a figure enlarges and
 zooms, files of it can be saved; the keyboard does the same; contrast; nothing wider than the screen; no error on the console and no
-request to elsewhere; a lost worker shows within two seconds; a page of a million samples opens within two.
+request to elsewhere; a lost worker shows within two seconds; the live page becomes the report; a page of a million samples opens within two.
 """
 
+import contextlib
 import json
 import os
 import pathlib
@@ -191,14 +192,12 @@ class Looker:
         check(page.run("window.kept[2].type === 'image/png' && window.kept[2].size > 5000"), "the PNG is empty")
 
     def live(self, scratch):
-        """The live page: one of two workers is killed in front of it; then the page becomes the report."""
-        out, says = scratch / "live", scratch / "says"
-        command = [self.program, "run", "examples/coarctation/study.toml", "--out", str(out), "--workers", "2", "--dashboard"]
-        run = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=says.open("w"))
-        try:
-            until(lambda: "live page at" in says.read_text() or run.poll() is not None, 120, "no live page")
-            check(run.poll() is None, says.read_text())
-            url = next(line.split(" at ", 1)[1] for line in says.read_text().splitlines() if line.startswith("live page at"))
+        """The live page: one of two workers is killed in front of it, by a run that does not end before everything was looked at."""
+        study = pathlib.Path(shutil.copytree("examples/coarctation", scratch / "many-passes")) / "study.toml"
+        text = study.read_text().replace('kind = "roukf"', 'kind = "roukf"\npasses = 1000')
+        check("passes = 1000" in text, "the study has no filter")
+        study.write_text(text)
+        with self.dashboard(study, scratch / "live") as (run, url):
             page = Page(self.browser, *WIDE)
             page.open(url)
             page.wait("document.querySelectorAll('#workers tr, table tbody tr').length > 0", 60, "the live page shows no worker")
@@ -221,8 +220,36 @@ class Looker:
             page.picture(self.pictures / "live-phone.png", whole=True)
             check(page.run("document.documentElement.scrollWidth <= innerWidth"), "the live page is wider than a phone")
             check(not page.faults(), page.faults())
+            check(run.poll() is None, "the run ended while it was looked at")
             page.close()
             print(f"live page: a killed worker shows after {took:.2f} s")
+
+    def becomes_report(self, scratch):
+        """The live page of a run that ends is its report."""
+        with self.dashboard("examples/coarctation/study.toml", scratch / "ends") as (_, url):
+            page = Page(self.browser, *WIDE)
+            page.open(url)
+
+            def is_report():
+                try:
+                    return page.run("location.pathname.endsWith('/report') && Boolean(document.querySelector('#fit figure'))")
+                except RuntimeError:
+                    return False  # Between two pages there is nobody to ask.
+
+            until(is_report, 120, "the live page does not become the report")
+            page.close()
+            print("live page: becomes the report")
+
+    @contextlib.contextmanager
+    def dashboard(self, study, out):
+        """A run with its live page: the process, and the address that it printed."""
+        says = out.with_suffix(".says")
+        command = [self.program, "run", str(study), "--out", str(out), "--workers", "2", "--dashboard"]
+        run = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=says.open("w"))
+        try:
+            until(lambda: "live page at" in says.read_text() or run.poll() is not None, 120, "no live page")
+            check(run.poll() is None, says.read_text())
+            yield run, next(line.split(" at ", 1)[1] for line in says.read_text().splitlines() if line.startswith("live page at"))
         finally:
             run.send_signal(signal.SIGINT)
             run.wait(60)
@@ -272,6 +299,7 @@ class Looker:
         explained = self.make(scratch / "explain", "explain", "examples/pig-aorta/explain-ex-vivo.toml", "--workers", "2", "--out", str(scratch / "explain"))
         self.look("explain", (explained / "report.html").as_uri(), "page-explain")
         self.live(scratch)
+        self.becomes_report(scratch)
         for name, arguments in {
             "identify": ("identify", "examples/pig-aorta/study.toml", "--workers", "2", "--html"),
             "spectrum": ("spectrum", "examples/oscillator/study.toml", "--html"),
