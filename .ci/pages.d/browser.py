@@ -81,9 +81,12 @@ class Page:
         self.send("Page.navigate", url=url)
         self.wait("document.readyState === 'complete'", 60)
         took = time.monotonic() - begun
-        # An idle headless browser draws nothing unless it is asked to.
-        self.run("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))")
+        self.drawn()
         return took
+
+    def drawn(self):
+        """Waits until what is there is drawn: an idle headless browser draws nothing unless it is asked to."""
+        self.run("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))")
 
     def run(self, script):
         """The value of an expression."""

@@ -52,16 +52,15 @@ class Looker:
             for scheme in ("light", "dark"):
                 page = Page(self.browser, wide, high, dark=scheme == "dark")
                 page.open(url)
-                time.sleep(0.2)
                 if scheme == "light":
                     page.picture(self.pictures / f"{name}-{width}.png")
                     if docs_name and self.docs and width == "wide":
                         page.size(1200, 760)
-                        time.sleep(0.2)
+                        page.drawn()
                         page.picture(pathlib.Path(self.docs) / f"{docs_name}.png")
                         page.size(wide, high)
                 page.run(OPEN_ALL)
-                time.sleep(0.2)
+                page.drawn()
                 if scheme == "light" or width == "wide":
                     page.picture(self.pictures / f"{name}-{width}-{scheme}-open.png", whole=True)
                 ratio, where = page.run(CONTRASTS)
