@@ -83,8 +83,45 @@ fn a_restart_goes_on_with_the_same_lines() {
         followed(dir.path(), &(rows[..2_500].join("\n") + "\n"), &["--state", "state.json"]);
     let (code, rest, stderr) = followed(dir.path(), &data, &["--state", "state.json"]);
     assert_eq!(code, 0, "{stderr}");
+    assert!(stderr.contains("its first 2401 rows were in the state already"), "{stderr}");
     parts.extend(rest);
     assert_eq!(parts, whole);
+}
+
+#[test]
+fn a_recording_that_is_not_the_one_of_its_state_is_told_and_changes_nothing() {
+    let dir = folder(STUDY, "");
+    let data = recording(3_000, usize::MAX);
+    let state = ["--state", "state.json"];
+    // A block ends with row 1400.
+    let (head, _) = data.split_at(data.match_indices('\n').nth(1_401).unwrap().0 + 1);
+    followed(dir.path(), head, &state);
+    let kept = fs::read(dir.path().join("state.json")).unwrap();
+    // Another recording of the same columns; one that was begun anew and is shorter, and one whose rows lie between.
+    let another = coupled(3_000, 500, 0.4);
+    let anew = &another[..another.len() / 3];
+    let between: String = data
+        .lines()
+        .enumerate()
+        .map(|(k, row)| match row.split_once(',') {
+            Some((time, rest)) if k > 0 => format!("{},{rest}\n", time.parse::<f64>().unwrap() + 0.001),
+            _ => format!("{row}\n"),
+        })
+        .collect();
+    for (data, says) in [
+        (another.as_str(), "with which the state ends"),
+        (anew, "there is no row at"),
+        (between.as_str(), "there is no row at"),
+    ] {
+        let (code, lines, stderr) = followed(dir.path(), data, &state);
+        assert!(code == 2 && stderr.contains(says) && stderr.contains("a state file of its own"), "{stderr}");
+        assert!(lines.is_empty(), "{lines:?}");
+        assert_eq!(fs::read(dir.path().join("state.json")).unwrap(), kept);
+    }
+    // What goes on behind the state needs none of the rows before it.
+    let (code, rest, stderr) =
+        followed(dir.path(), &format!("{}\n{}", data.lines().next().unwrap(), &data[head.len()..]), &state);
+    assert!(code == 0 && !rest.is_empty() && !stderr.contains("already"), "{stderr}");
 }
 
 #[test]

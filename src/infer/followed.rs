@@ -47,7 +47,11 @@ fn rows(study: &Study, name: &Path, text: impl Read, state: Option<PathBuf>) -> 
             } else {
                 ""
             };
-            note(format_args!("{} ended after {} steps{left_off}", name.display(), followed.n_step));
+            let known = match followed.n_known {
+                0 => String::new(),
+                n => format!("; its first {n} rows were in the state already"),
+            };
+            note(format_args!("{} ended after {} steps{known}{left_off}", name.display(), followed.n_step));
             Ok(())
         }
         (Err(error), None) => Err(failed(&error)),

@@ -4,6 +4,7 @@
 //! the estimate. Next files to read: [`line`](mod@line), what is told, and `state.rs`, what a restart goes on from.
 
 mod follower;
+mod known;
 pub mod line;
 pub(crate) mod state;
 mod whole_lines;
@@ -20,11 +21,15 @@ use crate::even_step::even_step;
 use crate::rows::{Row, Rows};
 use crate::run::{asked, choice};
 use follower::Follower;
+use known::Known;
 use line::Line;
 use whole_lines::WholeLines;
 
 /// Rows from which the sampling step is taken where the study does not say it.
 const FIRST: usize = 100;
+
+/// What to do where a state and a recording do not belong together.
+const ANOTHER: &str = "is it another recording, or begun anew? give it a state file of its own";
 
 /// Where rows come from, and what a restart goes on from.
 pub struct Source<'a, R> {
@@ -39,8 +44,10 @@ pub struct Source<'a, R> {
 /// How far a recording was followed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Followed {
-    /// Steps.
+    /// Steps, with those of the state.
     pub n_step: u64,
+    /// Rows that the state had taken already.
+    pub n_known: u64,
     /// Whether its last line was not taken, since no line break ended it.
     pub left_off: bool,
 }
@@ -72,19 +79,18 @@ pub fn follow<R: Read>(
     };
     let asked = asked(study, settings, step)?;
     let mut follower = Follower::new(&asked, step)?;
-    let mut after = f64::NEG_INFINITY;
+    let mut known = Known::default();
     if let Some(saved) = saved {
         let file = source.state.clone().unwrap_or_default();
         let damaged = |message: String| InferError::State { file: file.clone(), message };
-        after = saved.time;
+        known = Known::up_to(saved.stream.last.clone());
         follower.resume(saved).map_err(|error| damaged(error.to_string()))?;
     }
     let mut values = vec![0.0; record.columns.len()];
     while let Some((line, time)) = first.next(&mut rows, &mut values)? {
-        if time <= after {
+        if known.has(time, &values).map_err(|message| rows.fault(Some(line), message, ANOTHER))? {
             continue;
         }
-        after = f64::NEG_INFINITY;
         let answer = follower
             .push(time, &values)
             .map_err(|error| told_at(&rows, line.saturating_sub(follower.rows_since(&error)), &error))?;
@@ -95,6 +101,7 @@ pub fn follow<R: Read>(
             }
         }
     }
+    known.ended().map_err(|message| rows.fault(None, message, ANOTHER))?;
     if follower.n_step < settings.follow.block as u64 {
         let message = format!(
             "the recording ended after {} steps, before a block of {} was full",
@@ -102,7 +109,7 @@ pub fn follow<R: Read>(
         );
         return Err(rows.fault(None, message, "a smaller [infer.follow] block answers sooner"));
     }
-    Ok(Followed { n_step: follower.n_step, left_off: rows.text().left_off })
+    Ok(Followed { n_step: follower.n_step, n_known: known.n_row, left_off: rows.text().left_off })
 }
 
 /// Refuses what is made of a whole recording.
