@@ -2,6 +2,8 @@
 //!
 //! Next file to read: [`super`].
 
+use std::cmp::Ordering;
+
 /// The row that a state ends with, and how many rows up to it were met.
 #[derive(Default)]
 pub(super) struct Known {
@@ -19,17 +21,18 @@ impl Known {
     /// Whether the state has taken a row; what is wrong where it has taken another in its place.
     pub(super) fn has(&mut self, time: f64, values: &[f64]) -> Result<bool, String> {
         let Some((last, held)) = &self.last else { return Ok(false) };
-        if time > *last {
-            self.ended()?;
-            // What comes after it and is earlier is at fault.
-            self.last = None;
-            return Ok(false);
-        }
-        if time == *last {
-            if held != values {
+        match time.partial_cmp(last) {
+            Some(Ordering::Less) => {}
+            Some(Ordering::Equal) if held == values => self.has_met_last = true,
+            Some(Ordering::Equal) => {
                 return Err(format!("the row at {time} is not {held:?}, with which the state ends"));
             }
-            self.has_met_last = true;
+            Some(Ordering::Greater) | None => {
+                self.ended()?;
+                // What comes after it and is earlier is at fault.
+                self.last = None;
+                return Ok(false);
+            }
         }
         self.n_row += 1;
         Ok(true)
