@@ -1,7 +1,7 @@
 //! A worker: dials the coordinator, builds the setups it is sent, runs jobs, answers each once.
 //!
-//! The network lives on the calling thread; every slot computes on a thread of its own, so a model that never yields delays
-//! no heartbeat. A worker keeps nothing between jobs that a job needs: built setups are a cache. No decision about retries
+//! Every slot computes on a thread of its own, and drives the network while it waits for a job; the calling thread does while all
+//! compute, so a model that never yields delays no heartbeat. A worker keeps nothing between jobs that a job needs: built setups are a cache. No decision about retries
 //! is taken here. Next files to read: [`config`], then `session` for one session with a coordinator and `slots` for the threads
 //! that compute.
 
@@ -43,6 +43,7 @@ use slots::Slots;
 pub use starlings_models::Factory;
 pub use starlings_pieces::PlaceName;
 pub use starlings_proto::access::AccessError;
+use starlings_proto::driven::Driven;
 use starlings_proto::{FromWorker, HeldRun, JobKey, Welcome};
 pub use starlings_proto::{INHERITED, LIFELINE, MAX_SLOTS};
 pub use starlings_sums::Reading;
@@ -139,7 +140,6 @@ fn told(dropped: usize) -> String {
 ///
 /// # Errors
 /// [`WorkerError`]; a lost connection is none, unless nobody answers within the patience afterwards.
-#[expect(clippy::needless_pass_by_value, reason = "a worker owns what it was told")]
 pub fn run(config: WorkerConfig) -> Result<WorkerReport, WorkerError> {
     if config.slots > MAX_SLOTS {
         return Err(WorkerError::TooManySlots { slots: config.slots });
@@ -147,12 +147,16 @@ pub fn run(config: WorkerConfig) -> Result<WorkerReport, WorkerError> {
     // One that ends with its connection has nobody to bring results to.
     let lasts = !config.once && config.connect != INHERITED;
     let held = lasts.then(|| Arc::new(Held::new(config.hold, &config.scratch)));
-    let slots = Slots::start(config.slots.max(1), held.clone()).map_err(WorkerError::Start)?;
-    let runtime =
-        tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(WorkerError::Start)?;
-    let result = runtime.block_on(serve(&config, &slots, held.as_ref()));
+    let network = Arc::new(Driven::new().map_err(WorkerError::Start)?);
+    let slots =
+        Slots::start(config.slots.max(1), held.clone(), Arc::clone(&network)).map_err(WorkerError::Start)?;
+    let (config, served) = (Arc::new(config), slots.clone());
+    let work = {
+        let config = Arc::clone(&config);
+        async move { serve(&config, &served, held.as_ref()).await }
+    };
+    let result = network.keep(work).unwrap_or_else(|ended| std::panic::resume_unwind(ended.into_panic()));
     slots.close();
-    runtime.shutdown_background();
     if let Ok(WorkerReport { reason, predictions, failures, .. }) = &result {
         (config.tell)(&News::Ended { reason: reason.clone(), answered: predictions + failures });
     }

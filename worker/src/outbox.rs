@@ -43,6 +43,8 @@ struct Queued {
     bytes: usize,
     /// Nothing is taken any more.
     has_ended: bool,
+    /// Threads that wait for room. Without one nobody is told of any, which is a call of the system for every message.
+    waiting: usize,
 }
 
 impl Outbox {
@@ -108,7 +110,12 @@ impl Room {
     /// Waits until less waits than may; false where nothing is taken any more.
     fn wait(&self) -> bool {
         let full = |queued: &mut Queued| queued.bytes >= MOST && !queued.has_ended;
-        let queued = self.freed.wait_while(self.lock(), full).unwrap_or_else(PoisonError::into_inner);
+        let mut queued = self.lock();
+        if full(&mut queued) {
+            queued.waiting += 1;
+            queued = self.freed.wait_while(queued, full).unwrap_or_else(PoisonError::into_inner);
+            queued.waiting -= 1;
+        }
         !queued.has_ended
     }
 
@@ -122,9 +129,9 @@ impl Outgoing {
     fn took(&self, bytes: usize) {
         let mut queued = self.room.lock();
         queued.bytes = queued.bytes.saturating_sub(bytes);
-        let has_room = queued.bytes < MOST;
+        let tells = queued.waiting > 0 && queued.bytes < MOST;
         drop(queued);
-        if has_room {
+        if tells {
             self.room.freed.notify_all();
         }
     }

@@ -197,6 +197,7 @@ async fn goodbye(outbox: &Outbox, inbound: &mut Streaming<generated::ToWorker>, 
 #[cfg(test)]
 mod tests {
     use starlings_models::{BuildSetup, Job, Setup, Window};
+    use starlings_proto::driven::Driven;
     use starlings_proto::{JobEncoder, Lease, SentWindows, State, encode_setup};
 
     use super::*;
@@ -218,8 +219,9 @@ mod tests {
     #[test]
     fn jobs_of_a_forgotten_setup_all_come_back_and_its_loss_is_told_once() {
         let (outbox, mut sent) = Outbox::new();
+        let network = Arc::new(Driven::new().unwrap());
         let (slots, setups) =
-            (Slots::start(1, None).unwrap(), Setups::new(Arc::new(|setup: &Setup| setup.build())));
+            (Slots::start(1, None, network).unwrap(), Setups::new(Arc::new(|setup: &Setup| setup.build())));
         let mut windows = ReceivedWindows::default();
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
         let inbox = Inbox::new(Transfers::nowhere(runtime.handle()), 1);

@@ -1,6 +1,7 @@
 //! The threads that compute: one queue, one thread per slot, first in first out.
 //!
-//! A panicking model is a failed job, not a dead worker. The wall time of each run is measured here. Next files to
+//! A panicking model is a failed job, not a dead worker. The wall time of each run is measured here. A thread without a job drives the
+//! network until one comes; one that computes looks after it between short runs, and leaves it to its keeper for long ones. Next files to
 //! read: [`task`], and [`streams`] for what becomes of runs when a connection ends.
 
 mod streams;
@@ -11,14 +12,16 @@ mod tests;
 use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use starlings_models::{ModelFailure, Until};
+use starlings_proto::driven::Driven;
 use starlings_proto::spent::spent;
 use starlings_proto::words::panic_text;
 use starlings_proto::{Lease, LeaseOutcome};
+use tokio::sync::Notify;
 
 use crate::held::Held;
 use crate::outbox::Outbox;
@@ -27,6 +30,9 @@ pub(crate) use task::{Asked, Task, Traced};
 /// Jobs that may wait per slot, twice what a coordinator sends ahead, and of the whole worker at least.
 const WAITING: usize = 128;
 const LEAST_WAITING: usize = 1024;
+
+/// How long a thread computes, in one run or in several, before the network is looked after.
+const AWAY: Duration = Duration::from_micros(200);
 
 /// The slots of this process.
 #[derive(Clone)]
@@ -39,8 +45,9 @@ pub(crate) struct Slots {
 struct Shared {
     /// Where results are held; `None` in a worker that ends with its connection.
     held: Option<Arc<Held>>,
+    network: Arc<Driven>,
     queue: Mutex<Queue>,
-    filled: Condvar,
+    filled: Notify,
     running: AtomicU32,
     predictions: AtomicU64,
     failures: AtomicU64,
@@ -50,10 +57,6 @@ struct Shared {
 struct Queue {
     tasks: VecDeque<Arc<Task>>,
     running: Vec<Arc<Task>>,
-    /// Threads that wait for a task and were not told of one.
-    idle: usize,
-    /// Threads that were told of a task and are not awake yet: for them nobody needs to be told again.
-    told: usize,
     /// No task is begun: no more results can be held.
     full: bool,
     closed: bool,
@@ -61,10 +64,18 @@ struct Queue {
     stream: Option<Outbox>,
 }
 
+/// What a thread does next.
+enum Next {
+    Task(Arc<Task>),
+    /// There is none that may be begun.
+    Later,
+    Closed,
+}
+
 impl Slots {
     /// Starts the threads, or none: those that started end again when the system gives no more.
-    pub(crate) fn start(n: usize, held: Option<Arc<Held>>) -> std::io::Result<Self> {
-        Self::start_with(n, held, |slot, work| {
+    pub(crate) fn start(n: usize, held: Option<Arc<Held>>, network: Arc<Driven>) -> std::io::Result<Self> {
+        Self::start_with(n, held, network, |slot, work| {
             std::thread::Builder::new().name(format!("slot-{slot}")).spawn(work)
         })
     }
@@ -72,12 +83,14 @@ impl Slots {
     fn start_with(
         n: usize,
         held: Option<Arc<Held>>,
+        network: Arc<Driven>,
         spawn: impl Fn(usize, Box<dyn FnOnce() + Send>) -> std::io::Result<JoinHandle<()>>,
     ) -> std::io::Result<Self> {
         let shared = Shared {
             held,
+            network,
             queue: Mutex::default(),
-            filled: Condvar::new(),
+            filled: Notify::new(),
             running: AtomicU32::new(0),
             predictions: AtomicU64::new(0),
             failures: AtomicU64::new(0),
@@ -103,17 +116,8 @@ impl Slots {
     }
 
     pub(crate) fn push(&self, task: Task) {
-        let mut queue = self.shared.lock();
-        queue.tasks.push_back(Arc::new(task));
-        let tells = queue.idle > 0;
-        if tells {
-            (queue.idle, queue.told) = (queue.idle - 1, queue.told + 1);
-        }
-        drop(queue);
-        // Each notice is a call of the system, and a thread takes longer to wake than several jobs to come.
-        if tells {
-            self.shared.filled.notify_one();
-        }
+        self.shared.lock().tasks.push_back(Arc::new(task));
+        self.shared.filled.notify_one();
     }
 
     /// Answers the given leases as withdrawn where they have not started; where `stop` says so, those that have are told to stop
@@ -166,18 +170,7 @@ impl Slots {
         queue.closed = true;
         queue.tasks.clear();
         drop(queue);
-        self.shared.filled.notify_all();
-    }
-}
-
-impl Queue {
-    /// A thread waits no more: it was told, or all were woken.
-    fn woke(&mut self) {
-        if self.told > 0 {
-            self.told -= 1;
-        } else {
-            self.idle -= 1;
-        }
+        self.shared.filled.notify_waiters();
     }
 }
 
@@ -186,51 +179,87 @@ impl Shared {
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn next(&self) -> Option<Arc<Task>> {
-        let mut queue = self.lock();
-        loop {
-            if queue.closed {
-                return None;
+    fn work(&self) {
+        // How long a run may take is not known before the first one.
+        let (mut last, mut away) = (AWAY, Duration::ZERO);
+        while let Some(task) = self.next(&mut away) {
+            if last >= AWAY || task.is_large() {
+                self.network.leave();
             }
-            if !queue.full
-                && let Some(task) = queue.tasks.pop_front()
-            {
-                queue.running.push(Arc::clone(&task));
-                return Some(task);
+            last = self.compute(task);
+            away += last;
+            if away >= AWAY {
+                self.network.glance();
+                away = Duration::ZERO;
             }
-            queue.idle += 1;
-            queue = self.filled.wait(queue).unwrap_or_else(PoisonError::into_inner);
-            queue.woke();
         }
     }
 
-    fn work(&self) {
-        while let Some(task) = self.next() {
-            task.begun();
-            self.running.fetch_add(1, Ordering::Relaxed);
-            let started = Instant::now();
-            let spent = spent();
-            let (span, traceparent) = task.traced();
-            let until = Until { spent: &spent, stop: &task.stop, traceparent: traceparent.as_deref() };
-            let result = catch_unwind(AssertUnwindSafe(|| task.forward.run_within(&task.job, &until)))
-                .unwrap_or_else(|panic| Err(ModelFailure::Solver(panic_text(panic.as_ref())).into()));
-            let cost = started.elapsed().as_secs_f64();
-            task.log(result.as_ref().err(), cost);
-            if let Some(span) = span {
-                span.end_with(result.as_ref().err());
+    /// The next task, once there is one; `None` where no more will come.
+    fn next(&self, away: &mut Duration) -> Option<Arc<Task>> {
+        match self.begin() {
+            Next::Task(task) => Some(task),
+            Next::Closed => None,
+            Next::Later => {
+                *away = Duration::ZERO;
+                self.network.wait(self.filled()).flatten()
             }
-            self.running.fetch_sub(1, Ordering::Relaxed);
-            // A result that came all the same is as good as any; what a stopped run says of itself is not.
-            if result.is_err() && task.stop.is_set() {
-                self.lock().running.retain(|running| !Arc::ptr_eq(running, &task));
-                if let Some(Asked { lease, outbox, .. }) = task.asked().take() {
-                    outbox.answer_when_room(lease, LeaseOutcome::Withdrawn, cost);
-                }
-                continue;
-            }
-            let counter = if result.is_ok() { &self.predictions } else { &self.failures };
-            counter.fetch_add(1, Ordering::Relaxed);
-            self.finished(task, result, cost);
         }
+    }
+
+    async fn filled(&self) -> Option<Arc<Task>> {
+        loop {
+            let mut filled = std::pin::pin!(self.filled.notified());
+            filled.as_mut().enable();
+            match self.begin() {
+                Next::Task(task) => return Some(task),
+                Next::Closed => return None,
+                Next::Later => filled.await,
+            }
+        }
+    }
+
+    fn begin(&self) -> Next {
+        let mut queue = self.lock();
+        if queue.closed {
+            return Next::Closed;
+        }
+        if queue.full {
+            return Next::Later;
+        }
+        let Some(task) = queue.tasks.pop_front() else { return Next::Later };
+        queue.running.push(Arc::clone(&task));
+        Next::Task(task)
+    }
+
+    /// Runs a task and answers it; how long the run took.
+    fn compute(&self, task: Arc<Task>) -> Duration {
+        task.begun();
+        self.running.fetch_add(1, Ordering::Relaxed);
+        let started = Instant::now();
+        let spent = spent();
+        let (span, traceparent) = task.traced();
+        let until = Until { spent: &spent, stop: &task.stop, traceparent: traceparent.as_deref() };
+        let result = catch_unwind(AssertUnwindSafe(|| task.forward.run_within(&task.job, &until)))
+            .unwrap_or_else(|panic| Err(ModelFailure::Solver(panic_text(panic.as_ref())).into()));
+        let took = started.elapsed();
+        let cost = took.as_secs_f64();
+        task.log(result.as_ref().err(), cost);
+        if let Some(span) = span {
+            span.end_with(result.as_ref().err());
+        }
+        self.running.fetch_sub(1, Ordering::Relaxed);
+        // A result that came all the same is as good as any; what a stopped run says of itself is not.
+        if result.is_err() && task.stop.is_set() {
+            self.lock().running.retain(|running| !Arc::ptr_eq(running, &task));
+            if let Some(Asked { lease, outbox, .. }) = task.asked().take() {
+                outbox.answer_when_room(lease, LeaseOutcome::Withdrawn, cost);
+            }
+            return took;
+        }
+        let counter = if result.is_ok() { &self.predictions } else { &self.failures };
+        counter.fetch_add(1, Ordering::Relaxed);
+        self.finished(task, result, cost);
+        took
     }
 }

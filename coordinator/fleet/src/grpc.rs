@@ -1,18 +1,21 @@
 //! A fleet of worker processes over gRPC: listens, and runs batches for a caller on an ordinary thread.
 //!
-//! The network lives on a thread of its own, so a caller that thinks for minutes between two batches delays no heartbeat. Next file to
+//! A caller that waits for its batch drives the network; one that thinks for minutes between two batches delays no heartbeat, since a
+//! thread keeps it. Next file to
 //! read: [`super::hub`], then [`super::network`].
 
 use std::net::SocketAddr;
 use std::ops::ControlFlow;
 use std::sync::Arc;
-use std::sync::mpsc::{self, RecvTimeoutError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use starlings_models::{BuildSetup, Job, Setup};
+use starlings_proto::driven::Driven;
 use starlings_proto::{MAX_MESSAGE, SetupId, encode_setup};
 use tokio::sync::mpsc::{UnboundedSender, unbounded_channel};
+use tokio::sync::oneshot;
+use tokio::time::timeout;
 use tokio_util::sync::CancellationToken;
 
 use super::bound::Bound;
@@ -42,7 +45,8 @@ pub struct GrpcFleet {
     adopted: UnboundedSender<Adopted>,
     batches: UnboundedSender<Submission>,
     stop: CancellationToken,
-    network: Option<JoinHandle<Result<(), String>>>,
+    pub(super) network: Arc<Driven>,
+    keeper: Option<JoinHandle<Result<(), String>>>,
     refusals: Arc<Refusals>,
     listening: Listening,
     pub(super) cancel: CancellationToken,
@@ -97,12 +101,14 @@ impl GrpcFleet {
             .transpose()
             .map_err(FleetError::Secrets)?;
         let ways = Ways { door, adopted: ends };
-        let network = {
+        let network = Arc::new(Driven::new().map_err(|e| FleetError::Stopped(e.to_string()))?);
+        let keeper = {
             let (hub, cancel, stop) = (Arc::clone(&hub), config.cancel.clone(), stop.clone());
+            let network = Arc::clone(&network);
             let heartbeat = config.heartbeat;
             std::thread::Builder::new()
                 .name("fleet-network".to_owned())
-                .spawn(move || network::run(ways, &hub, heartbeat, submitted, &cancel, &stop))
+                .spawn(move || network::run(&network, ways, &hub, heartbeat, submitted, (cancel, stop)))
                 .map_err(|e| FleetError::Stopped(e.to_string()))?
         };
         if let Some(address) = address {
@@ -113,7 +119,8 @@ impl GrpcFleet {
             adopted,
             batches,
             stop,
-            network: Some(network),
+            network,
+            keeper: Some(keeper),
             refusals,
             listening: Listening { address, is_open: config.secrets.is_none(), start: None, refused: None },
             cancel: config.cancel,
@@ -154,25 +161,18 @@ impl GrpcFleet {
 
     fn wait(
         &self,
-        replies: &mpsc::Receiver<Reply>,
+        mut replies: oneshot::Receiver<Reply>,
         arrived: Arrived<'_>,
     ) -> Result<Vec<Outcome<Held>>, FleetError> {
         loop {
-            match replies.recv_timeout(TELL_EVERY) {
-                Ok(Ok(outcomes)) => return Ok(outcomes),
-                Ok(Err(error)) => {
+            match self.network.wait(async { timeout(TELL_EVERY, &mut replies).await }) {
+                Some(Ok(Ok(Ok(outcomes)))) => return Ok(outcomes),
+                Some(Ok(Ok(Err(error)))) => {
                     let _ = arrived(self.hub.arrived());
                     return Err(explained(error, self.listening()));
                 }
-                Err(RecvTimeoutError::Disconnected) => {
-                    // The batch was dropped by a network that is about to end: what it says then is the reason.
-                    let deadline = Instant::now() + ALIVE_CHECK;
-                    while !self.has_ended() && Instant::now() < deadline {
-                        std::thread::sleep(ALIVE_CHECK / 1000);
-                    }
-                    return Err(FleetError::Stopped(self.hub.why_stopped()));
-                }
-                Err(RecvTimeoutError::Timeout) => {
+                Some(Ok(Err(_))) | None => return Err(self.end_of()),
+                Some(Err(_)) => {
                     if self.has_ended() {
                         return Err(FleetError::Stopped(self.hub.why_stopped()));
                     }
@@ -185,8 +185,17 @@ impl GrpcFleet {
         }
     }
 
+    /// Why a batch was dropped: by a network that is about to end, and what it says then is the reason.
+    fn end_of(&self) -> FleetError {
+        let deadline = Instant::now() + ALIVE_CHECK;
+        while !self.has_ended() && Instant::now() < deadline {
+            std::thread::sleep(ALIVE_CHECK / 1000);
+        }
+        FleetError::Stopped(self.hub.why_stopped())
+    }
+
     pub(super) fn has_ended(&self) -> bool {
-        self.network.as_ref().is_none_or(JoinHandle::is_finished)
+        self.keeper.as_ref().is_none_or(JoinHandle::is_finished)
     }
 
     fn listening(&self) -> Listening {
@@ -233,12 +242,12 @@ impl Fleet for GrpcFleet {
         if !self.hub.knows(jobs.iter().map(|(setup, _)| setup)) {
             return Err(FleetError::UnknownSetup);
         }
-        let (reply, replies) = mpsc::channel();
+        let (reply, replies) = oneshot::channel();
         self.hub.states().tidy();
         // Here and not under the hub's lock.
         let batch = submission(jobs, self.hub.states(), reply)?;
         self.batches.send(batch).map_err(|_| FleetError::Stopped(self.hub.why_stopped()))?;
-        self.wait(&replies, arrived)
+        self.wait(replies, arrived)
     }
 
     fn recombine(&mut self, work: &Recombine<'_>) -> Result<Option<Vec<StoredState>>, FleetError> {
@@ -261,8 +270,9 @@ impl Fleet for GrpcFleet {
 impl Drop for GrpcFleet {
     fn drop(&mut self) {
         self.stop.cancel();
-        if let Some(network) = self.network.take() {
-            match network.join() {
+        self.network.leave();
+        if let Some(keeper) = self.keeper.take() {
+            match keeper.join() {
                 Ok(Ok(())) => {}
                 Ok(Err(error)) => tracing::warn!(error, "the fleet's network ended with an error"),
                 Err(_) => tracing::error!("the fleet's network thread panicked"),

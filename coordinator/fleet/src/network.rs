@@ -1,8 +1,9 @@
-//! The network thread: one runtime that serves the workers' streams, keeps time, and starts the caller's batches.
+//! What the network does: serves the workers' streams, keeps time, and starts the caller's batches; and the thread that keeps it.
 
 use std::sync::Arc;
 use std::time::Duration;
 
+use starlings_proto::driven::Driven;
 use starlings_proto::generated::fleet_server::FleetServer;
 use starlings_proto::socket::SocketEnd;
 use starlings_proto::words::{causes, panic_words};
@@ -45,68 +46,73 @@ pub(super) struct Ways {
     pub(super) adopted: UnboundedReceiver<Adopted>,
 }
 
-/// Serves until stopped; then asks the workers to leave and waits shortly for them.
+/// Keeps the network until it is stopped; then asks the workers to leave and waits shortly for them.
 pub(super) fn run(
+    network: &Driven,
     ways: Ways,
     hub: &Arc<Hub>,
     heartbeat: Duration,
     submitted: UnboundedReceiver<Submission>,
-    cancel: &CancellationToken,
-    stop: &CancellationToken,
+    (cancel, stop): (CancellationToken, CancellationToken),
 ) -> Result<(), String> {
-    let runtime = tokio::runtime::Builder::new_current_thread()
-        .enable_all()
-        .build()
-        .map_err(|error| error.to_string())?;
-    let outcome = runtime.block_on(async {
-        let Ways { door, adopted } = ways;
-        let opened = door.map(|door| Ok((door.check(), door.open()?))).transpose();
-        let opened = opened.map_err(|error: std::io::Error| error.to_string())?;
-        let mut tasks = JoinSet::new();
-        tasks.spawn(tick(Arc::clone(hub), heartbeat));
-        tasks.spawn(beat(Arc::clone(hub), heartbeat));
-        tasks.spawn(submit(Arc::clone(hub), submitted, cancel.clone()));
-        tasks.spawn(abort_on_cancel(Arc::clone(hub), cancel.clone()));
-        let service = service(hub);
-        let server = || {
-            Server::builder()
-                .http2_keepalive_interval(Some(KEEP_ALIVE.0))
-                .http2_keepalive_timeout(Some(KEEP_ALIVE.1))
-                .initial_stream_window_size(WINDOWS.0)
-                .initial_connection_window_size(WINDOWS.1)
-                .max_frame_size(FRAME_SIZE)
-                .max_concurrent_streams(Some(STREAMS))
-        };
-        let inherited = UnboundedReceiverStream::new(adopted).map(|adopted| {
-            SocketEnd::new(adopted.connection).map(|end| end.with_descriptors(adopted.descriptors))
-        });
-        let listening = async {
-            match opened {
-                Some((check, incoming)) => {
-                    let checked = InterceptedService::new(service.clone(), check);
-                    server().add_service(checked).serve_with_incoming(incoming).await
-                }
-                None => std::future::pending().await,
-            }
-        };
-        let server = async {
-            tokio::select! {
-                ended = listening => ended,
-                // The handles of the fleet hold its other end open.
-                ended = server().add_service(service.clone()).serve_with_incoming(inherited) => ended,
-            }
-        };
-        tokio::select! {
-            ended = server => Err(ended.err().map_or_else(|| "its server ended".to_owned(), |error| causes(&error))),
-            Some(ended) = tasks.join_next() => Err(task_ended(ended)),
-            () = drained(hub, stop) => Ok(()),
-        }
-    });
+    let served = network.keep(serve(ways, Arc::clone(hub), heartbeat, submitted, cancel, stop));
+    let outcome = served.unwrap_or_else(|ended| Err(task_ended(Err(ended))));
     if let Err(reason) = &outcome {
         hub.stopped(reason);
     }
-    runtime.shutdown_background();
     outcome
+}
+
+async fn serve(
+    ways: Ways,
+    hub: Arc<Hub>,
+    heartbeat: Duration,
+    submitted: UnboundedReceiver<Submission>,
+    cancel: CancellationToken,
+    stop: CancellationToken,
+) -> Result<(), String> {
+    let Ways { door, adopted } = ways;
+    let opened = door.map(|door| Ok((door.check(), door.open()?))).transpose();
+    let opened = opened.map_err(|error: std::io::Error| error.to_string())?;
+    let mut tasks = JoinSet::new();
+    tasks.spawn(tick(Arc::clone(&hub), heartbeat));
+    tasks.spawn(beat(Arc::clone(&hub), heartbeat));
+    tasks.spawn(submit(Arc::clone(&hub), submitted, cancel.clone()));
+    tasks.spawn(abort_on_cancel(Arc::clone(&hub), cancel));
+    let service = service(&hub);
+    let server = || {
+        Server::builder()
+            .http2_keepalive_interval(Some(KEEP_ALIVE.0))
+            .http2_keepalive_timeout(Some(KEEP_ALIVE.1))
+            .initial_stream_window_size(WINDOWS.0)
+            .initial_connection_window_size(WINDOWS.1)
+            .max_frame_size(FRAME_SIZE)
+            .max_concurrent_streams(Some(STREAMS))
+    };
+    let inherited = UnboundedReceiverStream::new(adopted).map(|adopted| {
+        SocketEnd::new(adopted.connection).map(|end| end.with_descriptors(adopted.descriptors))
+    });
+    let listening = async {
+        match opened {
+            Some((check, incoming)) => {
+                let checked = InterceptedService::new(service.clone(), check);
+                server().add_service(checked).serve_with_incoming(incoming).await
+            }
+            None => std::future::pending().await,
+        }
+    };
+    let server = async {
+        tokio::select! {
+            ended = listening => ended,
+            // The handles of the fleet hold its other end open.
+            ended = server().add_service(service.clone()).serve_with_incoming(inherited) => ended,
+        }
+    };
+    tokio::select! {
+        ended = server => Err(ended.err().map_or_else(|| "its server ended".to_owned(), |error| causes(&error))),
+        Some(ended) = tasks.join_next() => Err(task_ended(ended)),
+        () = drained(&hub, &stop) => Ok(()),
+    }
 }
 
 /// What answers workers.

@@ -139,6 +139,7 @@ impl GrpcFleet {
         work: &Recombine<'_>,
         heard: &mpsc::Receiver<Made>,
     ) -> Result<Vec<StoredState>, Broken> {
+        self.network.leave();
         let n_state = work.columns.first().map_or(0, StoredState::n_state);
         let mut writers: Vec<StateWriter> =
             work.columns.iter().map(|_| self.hub.states().writer(n_state)).collect();

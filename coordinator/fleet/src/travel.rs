@@ -2,12 +2,11 @@
 //!
 //! Next file to read: the module `convert` of `starlings-proto`, which holds the limits.
 
-use std::sync::mpsc::Sender;
-
 use starlings_models::{Job, Prediction};
 use starlings_proto::convert::job::check_size;
 use starlings_proto::convert::state::check_state;
 use starlings_proto::{JobEncoder, ProtocolError, SetupId, State};
+use tokio::sync::oneshot;
 
 use crate::hub::{Reply, Submission};
 use crate::{FleetError, Held, StateError, StateStore};
@@ -33,7 +32,7 @@ pub fn returns(prediction: &Prediction<Held>) -> Result<(), ProtocolError> {
 pub(crate) fn submission(
     jobs: Vec<(SetupId, Job<Held>)>,
     store: &StateStore,
-    reply: Sender<Reply>,
+    reply: oneshot::Sender<Reply>,
 ) -> Result<Submission, FleetError> {
     for (_, job) in &jobs {
         travels(job).map_err(FleetError::TooLarge)?;

@@ -30,7 +30,7 @@ impl Slots {
         let (mut keys, all) = (JobKeys::default(), queue.running.iter().chain(&queue.tasks));
         let keys = all.map(|task| task.of().key(&mut keys)).collect();
         drop(queue);
-        self.shared.filled.notify_all();
+        self.shared.filled.notify_waiters();
         keys
     }
 
@@ -108,6 +108,8 @@ impl Shared {
 
     /// A stream that came meanwhile knows the run as one that goes on: it asks for the result.
     fn ended_large(&self, task: Arc<Task>, large: Arc<Large>) {
+        // This thread waits for its state to arrive.
+        self.network.leave();
         let is_put = task.asked().is_some();
         if self.over(&task, || Ended::Large(Arc::clone(&large)), is_put).is_err() {
             return;

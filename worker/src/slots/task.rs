@@ -75,6 +75,11 @@ impl Task {
         self.key.map_or_else(|| Of::Job(self.setup, Arc::clone(&self.job)), Of::Key)
     }
 
+    /// Whether it begins from a large state.
+    pub(super) fn is_large(&self) -> bool {
+        self.key.is_some()
+    }
+
     /// The large state that it began from, unless somebody has the task too.
     pub(super) fn into_large_state(self: Arc<Self>) -> Option<Vec<f64>> {
         let task = Arc::into_inner(self).filter(|task| task.key.is_some())?;

@@ -59,11 +59,16 @@ impl Forward for Stubborn {
     }
 }
 
+/// A network on which nothing happens.
+fn network() -> Arc<Driven> {
+    Arc::new(Driven::new().expect("a runtime"))
+}
+
 #[test]
 fn a_run_that_is_over_stops_what_computes_and_nothing_of_it_is_kept_or_told_to_the_next_one() {
     let (outbox, mut sent) = Outbox::new();
     let held = Arc::new(Held::new(crate::HoldLimits::default(), &std::env::temp_dir()));
-    let slots = Slots::start(2, Some(Arc::clone(&held))).unwrap();
+    let slots = Slots::start(2, Some(Arc::clone(&held)), network()).unwrap();
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
     let transfers = crate::transfer::Transfers::nowhere(runtime.handle());
     let forwards: [Arc<dyn Forward>; 3] = [Arc::new(Endless), Arc::new(Stubborn), Arc::new(Endless)];
@@ -92,7 +97,7 @@ fn a_run_that_is_over_stops_what_computes_and_nothing_of_it_is_kept_or_told_to_t
 #[test]
 fn a_computing_job_is_stopped_when_that_is_asked_for_and_answered_as_withdrawn() {
     let (outbox, mut sent) = Outbox::new();
-    let slots = Slots::start(1, None).unwrap();
+    let slots = Slots::start(1, None, network()).unwrap();
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
     let transfers = crate::transfer::Transfers::nowhere(runtime.handle());
     let lease = |job| Lease { epoch: 1, job, attempt: 1 };
@@ -138,6 +143,6 @@ fn threads_that_started_end_again_when_the_system_gives_no_more() {
             ended.fetch_add(1, Ordering::Relaxed);
         }))
     };
-    assert!(Slots::start_with(5, None, spawn).is_err());
+    assert!(Slots::start_with(5, None, network(), spawn).is_err());
     assert_eq!(ended.load(Ordering::Relaxed), 3);
 }

@@ -4,7 +4,7 @@ use super::*;
 
 #[test]
 fn a_panic_in_the_middle_of_a_decision_ends_the_run_with_an_error() {
-    let (sender, _events) = mpsc::channel();
+    let (sender, _events) = std::sync::mpsc::channel();
     let config = FleetConfig::new(None, "test", CancellationToken::new(), sender);
     let mut fleet = GrpcFleet::listen(config).expect("a fleet");
     let setup = fleet.install(&Setup::default()).expect("it travels");

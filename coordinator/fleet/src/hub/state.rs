@@ -7,6 +7,7 @@ use std::sync::mpsc::Sender;
 use std::time::Duration;
 
 use starlings_proto::{Bytes, Hello, JobEncoder, PROTOCOL, SetupId, ToWorker, VERSION, generated};
+use tokio::sync::oneshot;
 
 use super::Reply;
 use super::blocks::Blocks;
@@ -87,7 +88,7 @@ pub(crate) struct Submission {
     pub(crate) states: Vec<StoredState>,
     /// Holds the windows of the jobs as they travel.
     pub(crate) encoder: JobEncoder,
-    pub(crate) reply: Sender<Reply>,
+    pub(crate) reply: oneshot::Sender<Reply>,
 }
 
 impl State {

@@ -4,6 +4,7 @@ use std::sync::mpsc::{self, Receiver};
 
 use starlings_models::{ModelFailure, Setup, Window};
 use starlings_proto::{JobEncoder, LeaseOutcome, ReceivedWindows, encode_setup};
+use tokio::sync::oneshot;
 
 use super::*;
 use crate::outbox::outbox;
@@ -42,7 +43,7 @@ fn hub(build: Option<[u8; 32]>) -> (Hub, Receiver<FleetEvent>) {
     )
 }
 
-fn batch(hub: &Hub) -> (Submission, Receiver<Reply>) {
+fn batch(hub: &Hub) -> (Submission, oneshot::Receiver<Reply>) {
     let (setup, json) = encode_setup(&Setup::default()).expect("it travels");
     let shape = SetupShape { parameters: vec!["k".to_owned()], n_state: None, sums: false };
     hub.install(setup, json, shape, Likeness::Exact);
@@ -54,7 +55,7 @@ fn batch(hub: &Hub) -> (Submission, Receiver<Reply>) {
         theta: vec![2.5],
         state: None,
     };
-    let (reply, replies) = mpsc::channel();
+    let (reply, replies) = oneshot::channel();
     (
         Submission { jobs: vec![(setup, job)], states: Vec::new(), encoder: JobEncoder::default(), reply },
         replies,
@@ -66,7 +67,7 @@ fn a_fleet_given_up_while_its_last_worker_was_still_linked_ends_when_it_leaves()
     let (hub, _events) = hub(None);
     let (link, _outgoing) = outbox();
     let worker = hub.join(hello(1, None), link).expect("it fits");
-    let (batch, replies) = batch(&hub);
+    let (batch, mut replies) = batch(&hub);
     hub.submit(batch);
     hub.give_up("each died".to_owned());
     assert!(replies.try_recv().is_err(), "a worker is there");
@@ -79,7 +80,7 @@ fn a_run_that_is_given_up_is_told_with_the_values_of_its_parameters() {
     let (hub, events) = hub(None);
     let (link, outgoing) = outbox();
     let worker = hub.join(hello(1, None), link).expect("it fits");
-    let (batch, replies) = batch(&hub);
+    let (batch, mut replies) = batch(&hub);
     let setup = batch.jobs[0].0;
     hub.submit(batch);
     hub.handle(Event::SetupDone { worker, setup });
