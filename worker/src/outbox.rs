@@ -1,6 +1,6 @@
 //! The way of a worker's messages to its coordinator: a queue of a bounded size between the threads and the network.
 //!
-//! A thread that computes waits where the coordinator takes nothing, as when it is stopped; the thread of the network never waits,
+//! A thread that computes waits where the coordinator takes nothing, as when it is stopped; the network never waits,
 //! and what it sends is small. Next file to read: [`crate::session`].
 
 use std::pin::Pin;

@@ -116,7 +116,7 @@ pub enum FleetError {
     /// A large state of a particle cannot be kept or read.
     #[error("{0}")]
     State(String),
-    /// The network thread ended although nobody closed the fleet.
+    /// The network ended although nobody closed the fleet.
     #[error("the fleet's network stopped: {0}")]
     Stopped(String),
 }

@@ -1,8 +1,7 @@
 //! A fleet of worker processes over gRPC: listens, and runs batches for a caller on an ordinary thread.
 //!
 //! A caller that waits for its batch drives the network; one that thinks for minutes between two batches delays no heartbeat, since a
-//! thread keeps it. Next file to
-//! read: [`super::hub`], then [`super::network`].
+//! thread keeps it. Next files to read: [`super::hub`], then [`super::network`].
 
 use std::net::SocketAddr;
 use std::ops::ControlFlow;
@@ -56,7 +55,7 @@ pub struct GrpcFleet {
 }
 
 impl GrpcFleet {
-    /// Listens and starts the network thread.
+    /// Listens and starts the thread that keeps the network.
     ///
     /// # Errors
     /// [`FleetError::Bind`] when the address is taken or does not exist; [`FleetError::Stopped`] when no thread can start.

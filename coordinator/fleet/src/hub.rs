@@ -1,7 +1,7 @@
 //! Carries the dispatcher's commands out: the one place where events meet the clock, the links and the waiting caller.
 //!
 //! Every event is handled to its end under one lock, on the thread that brings it. A panic under that lock is a broken invariant:
-//! the next event panics too, and the network thread turns that into the end of the fleet. Nothing is decided here. Next file to
+//! the next event panics too, and the network turns that into the end of the fleet. Nothing is decided here. Next file to
 //! read: `state`, then [`super::service`], which brings the workers' events.
 
 mod arrival;
@@ -47,7 +47,7 @@ pub(super) use state::{Closed, SetupShape, Submission};
 /// Answer to the caller of a batch.
 pub(super) type Reply = Result<Vec<Outcome<Held>>, BatchError>;
 
-/// Shared by the network thread and the callers.
+/// Shared by the network and the callers.
 pub(super) struct Hub {
     state: Mutex<State>,
     started: Instant,
