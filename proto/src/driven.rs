@@ -9,7 +9,7 @@ use std::io;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering::SeqCst};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::thread::Thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use tokio::runtime::{Builder, Handle, Runtime};
 use tokio::sync::{Notify, oneshot};
@@ -21,6 +21,9 @@ const LOOK: Duration = Duration::from_millis(2);
 
 /// Looks at somebody who waits on and on, after which the keeper sleeps until that one stops waiting.
 const LOOKS: u32 = 50;
+
+/// How long the end of a network waits for those who waited for it; where one is later, its connections end with that one.
+const LETTING_GO: Duration = Duration::from_secs(1);
 
 /// A network that is driven by whoever waits for it.
 pub struct Driven {
@@ -89,9 +92,12 @@ impl Driven {
 
     /// Says that this thread will be away for longer, so that the keeper drives from now on, where nobody else does.
     pub fn leave(&self) {
-        if self.waiting.load(SeqCst) == 0 && !self.keeper.drives.load(SeqCst) {
+        if self.waiting.load(SeqCst) == 0 {
+            // One that drives may be about to let go.
             self.keeper.asked.store(true, SeqCst);
-            self.keeper.wake();
+            if !self.keeper.drives.load(SeqCst) {
+                self.keeper.wake();
+            }
         }
     }
 
@@ -127,9 +133,10 @@ impl Driven {
             if let Ok(outcome) = ended.try_recv() {
                 return outcome;
             }
+            // In this order: one who asks, and who begins and ends a turn meanwhile, is not passed over.
+            let is_asked = self.keeper.asked.swap(false, SeqCst);
             let (turns, waiting) = (self.turns.load(SeqCst), self.waiting.load(SeqCst));
             let is_same = seen.replace(turns) == Some(turns);
-            let is_asked = self.keeper.asked.swap(false, SeqCst);
             if waiting == 0 && (is_same || is_asked) {
                 let outcome = self.drive(&runtime, &mut ended);
                 if let Some(outcome) = outcome {
@@ -161,12 +168,19 @@ impl Driven {
                 tokio::select! {
                     biased;
                     outcome = ended => outcome.ok(),
-                    () = self.keeper.wanted.notified() => None,
+                    () = self.wanted() => None,
                 }
             })
         });
         self.keeper.drives.store(false, SeqCst);
         outcome.flatten()
+    }
+
+    /// Until somebody waits: a notice may be left over from one who waits no more.
+    async fn wanted(&self) {
+        while self.waiting.load(SeqCst) == 0 {
+            self.keeper.wanted.notified().await;
+        }
     }
 
     /// Sleeps until nobody waits, or it is over.
@@ -184,10 +198,15 @@ impl Driven {
         &self.handle
     }
 
-    /// Ends the network: its tasks and connections are dropped, and nobody waits any more.
+    /// Ends the network: nobody waits any more, and its tasks and connections are dropped.
     fn end(&self) {
         self.ended.cancel();
-        drop(self.lock().take());
+        let Some(runtime) = self.lock().take() else { return };
+        // Those who waited let go of it.
+        let deadline = Instant::now() + LETTING_GO;
+        while Arc::strong_count(&runtime) > 1 && Instant::now() < deadline {
+            std::thread::yield_now();
+        }
     }
 
     fn runtime(&self) -> Option<Arc<Owned>> {

@@ -245,7 +245,7 @@ impl Fleet for GrpcFleet {
         self.hub.states().tidy();
         // Here and not under the hub's lock.
         let batch = submission(jobs, self.hub.states(), reply)?;
-        self.batches.send(batch).map_err(|_| FleetError::Stopped(self.hub.why_stopped()))?;
+        self.batches.send(batch).map_err(|_| self.end_of())?;
         self.wait(replies, arrived)
     }
 

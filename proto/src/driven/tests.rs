@@ -1,5 +1,6 @@
 //! Who drives when: nothing stands still, whoever waits or not.
 
+use std::io::Read;
 use std::sync::mpsc;
 use std::time::Duration;
 
@@ -124,12 +125,21 @@ fn turns_of_many_threads_and_the_keeper_lose_nothing() {
 fn nobody_waits_for_a_network_that_has_ended() {
     let kept = Kept::new();
     let network = Arc::clone(&kept.network);
+    let (near, mut far) = std::os::unix::net::UnixStream::pair().unwrap();
+    near.set_nonblocking(true).unwrap();
+    far.set_nonblocking(true).unwrap();
+    network.handle().spawn(async move {
+        let _open = UnixStream::from_std(near).unwrap();
+        std::future::pending::<()>().await;
+    });
     std::thread::scope(|threads| {
         let waiting = [(); 3].map(|()| threads.spawn(|| network.wait(std::future::pending::<()>())));
         while network.waiting.load(SeqCst) < 3 {
             std::thread::yield_now();
         }
         kept.end();
+        // All that was open is closed by now.
+        assert_eq!(far.read(&mut [0]).unwrap(), 0);
         for thread in waiting {
             assert_eq!(thread.join().unwrap(), None);
         }
