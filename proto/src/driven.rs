@@ -16,11 +16,10 @@ use tokio::sync::{Notify, oneshot};
 use tokio::task::JoinError;
 use tokio_util::sync::CancellationToken;
 
-/// Time between two looks of the keeper; it drives where nobody did from one to the next.
+/// Time between two looks of the keeper, at first and at most: it doubles while turns are short. The keeper drives where nobody did from
+/// one look to the next, and sleeps where somebody waited all the time.
 const LOOK: Duration = Duration::from_millis(2);
-
-/// Looks at somebody who waits on and on, after which the keeper sleeps until that one stops waiting.
-const LOOKS: u32 = 50;
+const LONGEST_LOOK: Duration = Duration::from_millis(32);
 
 /// How long the end of a network waits for those who waited for it; where one is later, its connections end with that one.
 const LETTING_GO: Duration = Duration::from_secs(1);
@@ -127,7 +126,7 @@ impl Driven {
 
     fn keep_until<T>(&self, mut ended: oneshot::Receiver<Result<T, JoinError>>) -> Result<T, JoinError> {
         let runtime = self.runtime().expect("nobody else ends it");
-        let (mut seen, mut same) = (None, 0);
+        let (mut seen, mut look) = (None, LOOK);
         self.keeper.asked.store(true, SeqCst);
         loop {
             if let Ok(outcome) = ended.try_recv() {
@@ -142,15 +141,13 @@ impl Driven {
                 if let Some(outcome) = outcome {
                     return outcome;
                 }
-                seen = None;
-                continue;
-            }
-            same = if is_same { same + 1 } else { 0 };
-            if same < LOOKS {
-                std::thread::park_timeout(LOOK);
-            } else {
+                (seen, look) = (None, LOOK);
+            } else if is_same {
                 self.sleep();
-                (seen, same) = (None, 0);
+                (seen, look) = (None, LOOK);
+            } else {
+                std::thread::park_timeout(look);
+                look = LONGEST_LOOK.min(2 * look);
             }
         }
     }

@@ -77,7 +77,7 @@ fn whoever_waits_drives() {
 fn the_keeper_drives_while_nobody_waits_also_after_somebody_did_for_long() {
     let kept = Kept::new();
     kept.after(Duration::from_millis(20)).recv_timeout(LONG).unwrap();
-    for waits in [Duration::ZERO, LOOK, 2 * LOOKS * LOOK] {
+    for waits in [Duration::ZERO, LOOK, 4 * LONGEST_LOOK] {
         // By then it sleeps, where that is longest.
         kept.network.wait(echo()).unwrap();
         kept.network.wait(async { tokio::time::sleep(waits).await }).unwrap();
