@@ -5,35 +5,26 @@ zooms, files of it can be saved; the keyboard does the same; contrast; nothing w
 request to elsewhere; a lost worker shows within two seconds; the live page becomes the report; a page of a million samples opens within two.
 """
 
-import contextlib
-import json
-import os
 import pathlib
 import shutil
-import signal
 import sqlite3
 import subprocess
 import sys
 import tempfile
 import time
 
-from browser import Browser, Page, until
+import live
+from browser import Browser, Page
+from expected import CONTRAST, PHONE, WIDE, check
 from scripts import CONTRASTS, CUT, OPEN_ALL
 
-WIDE, PHONE = (1400, 1000), (420, 900)
 # Widths of windows on laptops, at which tables are looked at too.
 BETWEEN = (1024, 1100, 1200, 1280)
-CONTRAST = 4.5
-# s; a worker is lost when its stream breaks, a page opens when it is loaded.
-LOST, OPEN = 2.0, 2.0
+# s; a page opens when it is loaded.
+OPEN = 2.0
 
 # Pages with courses, whose values can be read.
 TOUCHED = ("report", "explain", "identify", "forecast", "infer", "diagnose", "compare")
-
-
-def check(is_so, why):
-    if not is_so:
-        raise AssertionError(why)
 
 
 class Looker:
@@ -190,69 +181,6 @@ class Looker:
         check(drawn == 0, "the SVG is not well formed")
         check(page.run("window.kept[2].type === 'image/png' && window.kept[2].size > 5000"), "the PNG is empty")
 
-    def live(self, scratch):
-        """The live page: one of two workers is killed in front of it, by a run that does not end before everything was looked at."""
-        study = pathlib.Path(shutil.copytree("examples/coarctation", scratch / "many-passes")) / "study.toml"
-        text = study.read_text().replace('kind = "roukf"', 'kind = "roukf"\npasses = 1000')
-        check("passes = 1000" in text, "the study has no filter")
-        study.write_text(text)
-        with self.dashboard(study, scratch / "live") as (run, url):
-            page = Page(self.browser, *WIDE)
-            page.open(url)
-            page.wait("document.querySelectorAll('#workers tr, table tbody tr').length > 0", 60, "the live page shows no worker")
-            time.sleep(1.5)
-            page.picture(self.pictures / "live-wide.png")
-            if self.docs:
-                page.picture(pathlib.Path(self.docs) / "live-page.png")
-            ratio, where = page.run(CONTRASTS)
-            check(ratio >= CONTRAST, f"live page: a contrast of {ratio:.2f} at {where}")
-            local = subprocess.run(["pgrep", "-P", str(run.pid), "-f", "worker"], capture_output=True, text=True).stdout.split()
-            check(local, "the run has no worker process of its own")
-            os.kill(int(local[0]), signal.SIGKILL)
-            begun = time.monotonic()
-            page.wait("[...document.querySelectorAll('.lost')].some((e) => e.checkVisibility() && /lost/.test(e.textContent))", 10, "a killed worker does not show")
-            took = time.monotonic() - begun
-            check(took <= LOST, f"a killed worker shows after {took:.2f} s")
-            page.picture(self.pictures / "live-lost.png")
-            page.size(*PHONE)
-            time.sleep(0.5)
-            page.picture(self.pictures / "live-phone.png", whole=True)
-            check(page.run("document.documentElement.scrollWidth <= innerWidth"), "the live page is wider than a phone")
-            check(not page.faults(), page.faults())
-            check(run.poll() is None, "the run ended while it was looked at")
-            page.close()
-            print(f"live page: a killed worker shows after {took:.2f} s")
-
-    def becomes_report(self, scratch):
-        """The live page of a run that ends is its report."""
-        with self.dashboard("examples/coarctation/study.toml", scratch / "ends") as (_, url):
-            page = Page(self.browser, *WIDE)
-            page.open(url)
-
-            def is_report():
-                try:
-                    return page.run("location.pathname.endsWith('/report') && Boolean(document.querySelector('#fit figure'))")
-                except RuntimeError:
-                    return False  # Between two pages there is nobody to ask.
-
-            until(is_report, 120, "the live page does not become the report")
-            page.close()
-            print("live page: becomes the report")
-
-    @contextlib.contextmanager
-    def dashboard(self, study, out):
-        """A run with its live page: the process, and the address that it printed."""
-        says = out.with_suffix(".says")
-        command = [self.program, "run", str(study), "--out", str(out), "--workers", "2", "--dashboard"]
-        run = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=says.open("w"))
-        try:
-            until(lambda: "live page at" in says.read_text() or run.poll() is not None, 120, "no live page")
-            check(run.poll() is None, says.read_text())
-            yield run, next(line.split(" at ", 1)[1] for line in says.read_text().splitlines() if line.startswith("live page at"))
-        finally:
-            run.send_signal(signal.SIGINT)
-            run.wait(60)
-
     def million(self, path):
         page = Page(self.browser, *WIDE)
         page.open("about:blank")
@@ -297,8 +225,8 @@ class Looker:
         self.no_script("report", report)
         explained = self.make(scratch / "explain", "explain", "examples/pig-aorta/explain-ex-vivo.toml", "--workers", "2", "--out", str(scratch / "explain"))
         self.look("explain", (explained / "report.html").as_uri(), "page-explain")
-        self.live(scratch)
-        self.becomes_report(scratch)
+        live.look(self, scratch)
+        live.becomes_report(self, scratch)
         for name, arguments in {
             "identify": ("identify", "examples/pig-aorta/study.toml", "--workers", "2", "--html"),
             "spectrum": ("spectrum", "examples/oscillator/study.toml", "--html"),

@@ -3,7 +3,8 @@
 //! `proto/fleet.proto` says what travels between coordinator and worker, `proto/solver.proto` between a worker and a solver
 //! outside, in which unit and shape. [`generated`] and [`generated_solver`] are generated from them; [`convert`] alone looks inside
 //! and checks and translates them. [`access`] is the file by which both sides know each other, [`socket`] the connection of workers
-//! that one process started, [`descriptors`] what is passed beside it, [`driven`] the network of a process that waits for it. No scheduling here. Next file to read: [`convert`].
+//! that one process started, [`descriptors`] what is passed beside it, [`driven`] the network of a process, driven by whoever waits
+//! for it. No scheduling here. Next file to read: [`convert`].
 
 pub mod access;
 pub mod adapters;

@@ -1,9 +1,9 @@
 //! A worker: dials the coordinator, builds the setups it is sent, runs jobs, answers each once.
 //!
 //! Every slot computes on a thread of its own, and drives the network while it waits for a job; the calling thread does while all
-//! compute, so a model that never yields delays no heartbeat. A worker keeps nothing between jobs that a job needs: built setups are a cache. No decision about retries
-//! is taken here. Next files to read: [`config`], then `session` for one session with a coordinator and `slots` for the threads
-//! that compute.
+//! compute, so a model that never yields delays no heartbeat. A worker keeps nothing between jobs that a job needs: built setups
+//! are a cache. No decision about retries is taken here. Next files to read: [`config`], then `session` for one session with a
+//! coordinator and `slots` for the threads that compute.
 
 mod blocks;
 pub mod config;

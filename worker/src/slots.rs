@@ -1,8 +1,8 @@
 //! The threads that compute: one queue, one thread per slot, first in first out.
 //!
-//! A panicking model is a failed job, not a dead worker. The wall time of each run is measured here. A thread without a job drives the
-//! network until one comes; one that computes looks after it between short runs, and leaves it to its keeper for long ones. Next files to
-//! read: [`task`], and [`streams`] for what becomes of runs when a connection ends.
+//! A panicking model is a failed job, not a dead worker. The wall time of each run is measured here. A thread without a job drives
+//! the network until one comes; one that computes looks after it between short runs, and leaves it to its keeper for long ones. Next
+//! files to read: [`task`], and [`streams`] for what becomes of runs when a connection ends.
 
 mod streams;
 mod task;

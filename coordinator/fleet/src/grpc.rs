@@ -164,22 +164,21 @@ impl GrpcFleet {
         arrived: Arrived<'_>,
     ) -> Result<Vec<Outcome<Held>>, FleetError> {
         loop {
-            match self.network.wait(async { timeout(TELL_EVERY, &mut replies).await }) {
-                Some(Ok(Ok(Ok(outcomes)))) => return Ok(outcomes),
-                Some(Ok(Ok(Err(error)))) => {
-                    let _ = arrived(self.hub.arrived());
-                    return Err(explained(error, self.listening()));
+            let reply = self.network.wait(async { timeout(TELL_EVERY, &mut replies).await });
+            match reply {
+                Some(Ok(Ok(reply))) => {
+                    return reply.map_err(|error| {
+                        let _ = arrived(self.hub.arrived());
+                        explained(error, self.listening())
+                    });
                 }
-                Some(Ok(Err(_))) | None => return Err(self.end_of()),
-                Some(Err(_)) => {
-                    if self.has_ended() {
-                        return Err(FleetError::Stopped(self.hub.why_stopped()));
-                    }
+                Some(Err(_)) if !self.has_ended() => {
                     if arrived(self.hub.arrived()).is_break() {
                         self.hub.handle(Event::Abort(BatchError::Cancelled));
                         return Err(FleetError::Cancelled);
                     }
                 }
+                Some(_) | None => return Err(self.end_of()),
             }
         }
     }
