@@ -1,13 +1,14 @@
 //! Messages to bytes and back as gRPC does it, with room for the whole message taken at once and no piece of a state in a larger one.
 //!
 //! A window of a long recording is more than a megabyte: a buffer that grows while it is written ends twice as large, and as many
-//! of them wait as there are jobs ahead of a worker. A piece that is kept keeps the whole message that it came in. Next file to read: [`crate::convert`].
+//! of them wait as there are jobs ahead of a worker. A piece that is kept keeps the whole message that it came in. Next file to read:
+//! [`crate::convert`].
 
 use std::any::TypeId;
 use std::marker::PhantomData;
 
 use prost::Message;
-use prost::bytes::Buf;
+use prost::bytes::{Buf, BufMut};
 use tonic::Status;
 use tonic::codec::{DecodeBuf, Decoder, EncodeBuf, Encoder};
 use tonic_prost::{ProstCodec, ProstDecoder};
@@ -17,6 +18,10 @@ use crate::generated::Chunk;
 
 /// Bytes of a message with a piece of a state, or names of pieces, at most.
 const MOST_OF_PIECE: usize = CHUNK_BYTES + 1024;
+
+/// Bytes of a message that is written at once: one of many short fields. Into a buffer of the network every byte of a varint is copied
+/// with a look for room, which costs more than to copy the whole once more.
+const SMALL: usize = 4096;
 
 /// Encodes `T`, decodes `U`.
 #[derive(Debug)]
@@ -35,7 +40,7 @@ impl<T: Message + Send + 'static, U: Message + Default + Send + 'static> tonic::
     type Decoder = Fitting<U>;
 
     fn encoder(&mut self) -> Self::Encoder {
-        Whole(PhantomData)
+        Whole { small: Vec::new(), of: PhantomData }
     }
 
     fn decoder(&mut self) -> Self::Decoder {
@@ -45,15 +50,26 @@ impl<T: Message + Send + 'static, U: Message + Default + Send + 'static> tonic::
 
 /// Encodes a message into a buffer of its size.
 #[derive(Debug)]
-pub(crate) struct Whole<T>(PhantomData<T>);
+pub(crate) struct Whole<T> {
+    /// What small messages are written to first.
+    small: Vec<u8>,
+    of: PhantomData<T>,
+}
 
 impl<T: Message> Encoder for Whole<T> {
     type Item = T;
     type Error = Status;
 
     fn encode(&mut self, item: T, buffer: &mut EncodeBuf<'_>) -> Result<(), Status> {
-        buffer.reserve(item.encoded_len());
-        item.encode(buffer).map_err(|error| Status::internal(error.to_string()))
+        let length = item.encoded_len();
+        if length > SMALL {
+            buffer.reserve(length);
+            return item.encode(buffer).map_err(|error| Status::internal(error.to_string()));
+        }
+        self.small.clear();
+        item.encode(&mut self.small).map_err(|error| Status::internal(error.to_string()))?;
+        buffer.put_slice(&self.small);
+        Ok(())
     }
 }
 

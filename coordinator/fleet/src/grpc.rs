@@ -224,8 +224,12 @@ impl Fleet for GrpcFleet {
 
     fn run_mixed(&mut self, jobs: Vec<(SetupId, Job)>) -> Result<Vec<Outcome>, FleetError> {
         let jobs = jobs.into_iter().map(|(setup, job)| (setup, job.map(Held::Values)));
-        let outcomes = self.run_held(jobs.collect())?;
-        outcomes.into_iter().map(|outcome| Ok(outcome.try_map(Held::into_values)?)).collect()
+        values(self.run_held(jobs.collect())?)
+    }
+
+    fn run(&mut self, setup: SetupId, jobs: Vec<Job>) -> Result<Vec<Outcome>, FleetError> {
+        let jobs = jobs.into_iter().map(|job| (setup, job.map(Held::Values)));
+        values(self.run_held(jobs.collect())?)
     }
 
     fn run_held(&mut self, jobs: Vec<(SetupId, Job<Held>)>) -> Result<Vec<Outcome<Held>>, FleetError> {
@@ -277,6 +281,11 @@ impl Drop for GrpcFleet {
             }
         }
     }
+}
+
+/// Outcomes with their states read.
+fn values(outcomes: Vec<Outcome<Held>>) -> Result<Vec<Outcome>, FleetError> {
+    outcomes.into_iter().map(|outcome| Ok(outcome.try_map(Held::into_values)?)).collect()
 }
 
 /// How runs of a setup compare: a program outside promises equal bits, or does not.

@@ -57,6 +57,9 @@ impl Dispatcher {
 
     /// A run was made by a worker: if it was set aside, it is no longer.
     pub(super) fn works(&mut self, id: WorkerId) {
+        if self.workers.get(id).is_none_or(|worker| worker.aside.is_none()) {
+            return;
+        }
         let Some(mut worker) = self.workers.get_mut(id) else { return };
         if worker.aside.take_if(|aside| aside.is_due).is_some() {
             self.out.push(Command::Notice(FleetEvent::WorkerBack { worker: worker.name.clone() }));

@@ -37,6 +37,8 @@ pub(super) struct Batch {
     first_job: u64,
     names: Vec<JobName>,
     jobs: Vec<State>,
+    /// How each job ended, apart from them: handed to the caller as they are.
+    outcomes: Vec<Option<Outcome>>,
     pub(super) queue: Queue,
     /// Jobs that failed twice and wait for a run that is known to work.
     parked: BTreeMap<usize, WorkerId>,
@@ -57,9 +59,8 @@ struct State {
     recalled: bool,
     /// The worker that it must not go to, as long as another one may run it.
     avoided: Option<WorkerId>,
-    earlier: Option<Earlier>,
+    earlier: Option<Box<Earlier>>,
     doubt: Option<Doubt>,
-    outcome: Option<Outcome>,
     /// Who made the run of the outcome.
     by: Option<WorkerId>,
 }
@@ -108,6 +109,7 @@ impl Batch {
             setups,
             open,
             first_job,
+            outcomes: vec![None; names.len()],
             names,
             jobs: states,
             queue,
@@ -168,7 +170,7 @@ impl Batch {
     }
 
     pub(super) fn into_outcomes(self) -> Vec<Outcome> {
-        self.jobs.into_iter().filter_map(|job| job.outcome).collect()
+        self.outcomes.into_iter().flatten().collect()
     }
 
     /// Counts a start and returns its number, from 1.
@@ -196,7 +198,7 @@ impl Batch {
 
     /// Keeps how an attempt ended.
     pub(super) fn remember(&mut self, index: usize, end: Ended, name: &str) {
-        self.jobs[index].earlier = Some(Earlier { end, name: name.to_owned() });
+        self.jobs[index].earlier = Some(Box::new(Earlier { end, name: name.to_owned() }));
     }
 
     /// What it is being tried for.
@@ -250,13 +252,13 @@ impl Batch {
         let mut ended = Vec::new();
         for index in self.queue.take_all(key) {
             let attempts = self.attempts(index);
-            match self.jobs[index].earlier.take() {
+            match self.jobs[index].earlier.take().map(|earlier| *earlier) {
                 Some(Earlier { end: Ended::Decided(failure), name }) => {
                     self.end(index, Outcome { result: Err(failure), attempts, worker: name });
                     ended.push(index);
                 }
                 other => {
-                    self.jobs[index].earlier = other;
+                    self.jobs[index].earlier = other.map(Box::new);
                     self.jobs[index].avoided = None;
                     self.requeue(index);
                 }
@@ -285,12 +287,12 @@ impl Batch {
     }
 
     fn end(&mut self, index: usize, outcome: Outcome) {
-        let job = &mut self.jobs[index];
-        debug_assert!(job.outcome.is_none(), "a job ends once: its only lease is released before");
-        if job.outcome.replace(outcome).is_none() {
+        let before = self.outcomes[index].replace(outcome);
+        debug_assert!(before.is_none(), "a job ends once: its only lease is released before");
+        if before.is_none() {
             self.ended.push(index);
             self.untold.push(index);
-            self.open[job.setup] -= 1;
+            self.open[self.jobs[index].setup] -= 1;
         }
     }
 }

@@ -14,6 +14,6 @@ impl Batch {
         let waits = |index: &usize| self.jobs[*index].by.is_some_and(|by| in_doubt.contains(&by));
         let (waiting, new): (Vec<_>, Vec<_>) = std::mem::take(&mut self.untold).into_iter().partition(waits);
         self.untold = waiting;
-        new.into_iter().filter_map(|index| Some((index, self.jobs[index].outcome.clone()?))).collect()
+        new.into_iter().filter_map(|index| Some((index, self.outcomes[index].clone()?))).collect()
     }
 }

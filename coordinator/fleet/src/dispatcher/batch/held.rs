@@ -10,7 +10,7 @@ impl Batch {
     pub(in crate::dispatcher) fn is_plain(&self, index: usize) -> bool {
         let job = &self.jobs[index];
         let is_untried = job.earlier.is_none() && job.doubt.is_none();
-        job.outcome.is_none() && is_untried && !self.parked.contains_key(&index)
+        !self.is_finished(index) && is_untried && !self.parked.contains_key(&index)
     }
 
     /// Takes out a job that waits for a worker; false where it does not wait.

@@ -48,7 +48,7 @@ impl Batch {
 
     /// That a job ended with a failure; its parameters are known to whoever holds the jobs.
     pub(in crate::dispatcher) fn failed(&self, index: usize) -> Command {
-        let outcome = self.jobs[index].outcome.as_ref();
+        let outcome = self.outcomes[index].as_ref();
         let reason = outcome.and_then(|o| o.result.as_ref().err()).map(ToString::to_string);
         self.given_up(index, outcome.map_or(0, |o| o.attempts), reason.unwrap_or_default())
     }

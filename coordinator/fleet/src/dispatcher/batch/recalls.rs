@@ -14,7 +14,7 @@ impl Batch {
             // A repeat goes nowhere else.
             !job.recalled
                 && job.doubt.is_none()
-                && job.outcome.is_none()
+                && !self.is_finished(index)
                 && setups.contains(self.setup_of(index))
         })
     }
