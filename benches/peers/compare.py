@@ -57,7 +57,7 @@ def sizes():
         "spins": [0.01] * 200,
         # Tenfold: between 2 and 20 ms, even in the logarithm.
         "spread": [0.002 * 10 ** draw.random() for _ in range(200)],
-        "states": 3,
+        "states": 12,
         "patience": 3.0,
     }
 

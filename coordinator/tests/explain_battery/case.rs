@@ -15,6 +15,8 @@ pub enum Kind {
     Unlisted,
     /// One of the library, but the search may name neither it nor its equals.
     LeftOut,
+    /// Two of the library at once.
+    Pair,
     /// An effect that the parameters imitate.
     Absorbed,
     /// An effect that no search knows.
@@ -31,6 +33,7 @@ impl Kind {
             Self::Generic => "generic",
             Self::Unlisted => "unlisted",
             Self::LeftOut => "left out",
+            Self::Pair => "pair",
             Self::Absorbed => "absorbed",
             Self::Alien => "alien",
             Self::Null => "null",
@@ -46,8 +49,12 @@ pub struct Case {
     pub kind: Kind,
     /// Name of the effect in the data.
     pub effect: Option<String>,
+    /// Name of the one beside it.
+    pub second: Option<String>,
     /// Names that are right.
     pub accepted: Vec<String>,
+    /// Names that are right for the one beside it.
+    pub accepted_second: Vec<String>,
     /// Names that the search may not try.
     pub without: Vec<String>,
     /// Noise in standard deviations of the channels.
@@ -59,6 +66,20 @@ pub struct Case {
     pub seed: u64,
     /// Whether the study leaves the noise to be found.
     pub auto: bool,
+}
+
+impl Case {
+    /// Whether these effects are what is missing, and nothing else.
+    pub fn is_right<T: AsRef<str>>(&self, set: &[T]) -> bool {
+        let is_in = |name: &T, list: &[String]| list.iter().any(|known| known == name.as_ref());
+        match set {
+            [one] => self.second.is_none() && is_in(one, &self.accepted),
+            [one, other] => [(one, other), (other, one)]
+                .iter()
+                .any(|(one, other)| is_in(one, &self.accepted) && is_in(other, &self.accepted_second)),
+            _ => false,
+        }
+    }
 }
 
 /// What became of it.
@@ -106,11 +127,11 @@ impl Outcome {
         }
     }
 
-    /// Judges an explanation against the names that are right.
-    pub fn of(found: &Explanation, accepted: &[String]) -> Self {
+    /// Judges an explanation against what is right.
+    pub fn of(found: &Explanation, case: &Case) -> Self {
         let named: Vec<&str> = found.effects.iter().map(|effect| effect.name.as_str()).collect();
-        let is_right = |set: &[&str]| set.len() == 1 && accepted.iter().any(|name| name == set[0]);
-        let tied = |set: &Vec<String>| is_right(&set.iter().map(String::as_str).collect::<Vec<_>>());
+        let is_right = |set: &[&str]| case.is_right(set);
+        let tied = |set: &Vec<String>| case.is_right(set);
         let is_made = found.effects.iter().any(|effect| effect.kind == EffectKind::Proposal);
         match found.verdict {
             Verdict::NoGap => Self::NoGap,
@@ -129,7 +150,7 @@ impl Outcome {
 pub struct Result {
     pub case: Case,
     pub outcome: Outcome,
-    /// χ² of the wrong model refitted to data without noise.
+    /// χ² of the wrong model refitted to data without noise; of a pair, that of the model with the better one of the two.
     pub lambda: f64,
     /// The true amplitude.
     pub amplitude: f64,

@@ -22,6 +22,8 @@ pub struct Draw {
     pub theta: Vec<f64>,
     /// The effect and its parameters.
     pub effect: Option<(EffectDef, Vec<f64>)>,
+    /// The one beside it.
+    pub second: Option<(EffectDef, Vec<f64>)>,
     /// Outputs without noise, one column per channel.
     pub clean: Vec<Vec<f64>>,
     /// What the effect changed, in standard deviations of the outputs.
@@ -40,35 +42,67 @@ pub fn random(parts: &[&str], seed: u64) -> ChaCha8Rng {
 /// Draws the parameters and, when one is named, an effect; `None` when the effect cannot reach the strength.
 pub fn draw(world: &World<'_>, effect: Option<&str>, seed: u64) -> Option<Draw> {
     let mut rng = random(&[world.system.name, effect.unwrap_or("null")], seed);
-    let plain = world.truth.build().unwrap();
-    // Values that the finer model can be run with: nearly always the first.
-    let (theta, base) = (0..TRIES).find_map(|_| {
-        let theta = parameters(world, &mut rng);
-        world.run(plain.as_ref(), &theta).map(|base| (theta, base))
-    })?;
+    let (theta, base) = plain(world, &mut rng)?;
     let Some(name) = effect else {
-        return Some(Draw { theta, effect: None, clean: base, change: 0.0 });
+        return Some(Draw { theta, effect: None, second: None, clean: base, change: 0.0 });
     };
-    let def = world.resolved(name, &theta);
+    let effect = strong(world, name, (&theta, &base), &mut rng)?;
+    let clean = together(world, &theta, &[&effect])?;
+    let change = change_of(&base, &clean);
+    Some(Draw { theta, effect: Some(effect), second: None, clean, change })
+}
+
+/// The same with two effects, each of the wanted strength by itself.
+pub fn draw_pair(world: &World<'_>, names: [&str; 2], seed: u64) -> Option<Draw> {
+    let mut rng = random(&[world.system.name, names[0], names[1]], seed);
+    let (theta, base) = plain(world, &mut rng)?;
+    let [first, second] = names.map(|name| strong(world, name, (&theta, &base), &mut rng));
+    let (first, second) = (first?, second?);
+    let clean = together(world, &theta, &[&first, &second])?;
+    let change = change_of(&base, &clean);
+    Some(Draw { theta, effect: Some(first), second: Some(second), clean, change })
+}
+
+/// Parameters that the finer model can be run with, nearly always the first ones, and what it gives without any effect.
+fn plain(world: &World<'_>, rng: &mut ChaCha8Rng) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
+    let plain = world.truth.build().unwrap();
+    (0..TRIES).find_map(|_| {
+        let theta = parameters(world, rng);
+        world.run(plain.as_ref(), &theta).map(|base| (theta, base))
+    })
+}
+
+/// An effect with values of its parameters at which it has the wanted strength.
+fn strong(
+    world: &World<'_>,
+    name: &str,
+    (theta, base): (&[f64], &[Vec<f64>]),
+    rng: &mut ChaCha8Rng,
+) -> Option<(EffectDef, Vec<f64>)> {
+    let def = world.resolved(name, theta);
     let setup = with_effect(&world.truth, &def);
     let forward = setup.build().unwrap_or_else(|error| panic!("{} {name}: {error}", world.system.name));
-    for _ in 0..TRIES {
-        let inner = inner_values(&def, &mut rng);
-        let run = |amplitude: f64| {
-            let values: Vec<f64> =
-                theta.iter().copied().chain([amplitude]).chain(inner.iter().copied()).collect();
-            world.run(forward.as_ref(), &values)
+    (0..TRIES).find_map(|_| {
+        let inner = inner_values(&def, rng);
+        let change = |amplitude: f64| {
+            let own = theta.iter().copied().chain([amplitude]);
+            let values: Vec<f64> = own.chain(inner.iter().copied()).collect();
+            world.run(forward.as_ref(), &values).map(|with| change_of(base, &with))
         };
-        let change = |amplitude: f64| run(amplitude).map(|with| change_of(&base, &with));
-        let side = side(def.parameters[0].range, &mut rng);
-        if let Some(amplitude) = amplitude(change, side) {
-            let clean = run(amplitude)?;
-            let change = change_of(&base, &clean);
-            let values: Vec<f64> = std::iter::once(amplitude).chain(inner.iter().copied()).collect();
-            return Some(Draw { theta, effect: Some((def, values)), clean, change });
-        }
+        let side = side(def.parameters[0].range, rng);
+        let amplitude = amplitude(change, side)?;
+        Some((def.clone(), std::iter::once(amplitude).chain(inner.iter().copied()).collect()))
+    })
+}
+
+/// What the truth gives with these effects.
+fn together(world: &World<'_>, theta: &[f64], effects: &[&(EffectDef, Vec<f64>)]) -> Option<Vec<Vec<f64>>> {
+    let (mut setup, mut values) = (world.truth.clone(), theta.to_vec());
+    for (def, own) in effects {
+        setup = with_effect(&setup, def);
+        values.extend(own);
     }
-    None
+    world.run(setup.build().ok()?.as_ref(), &values)
 }
 
 /// The setup with an effect and its parameters behind the model's own.

@@ -95,6 +95,7 @@ fn a_small_battery_is_explained() {
             Kind::Alien => matches!(effect, "telegraph-force" | "straining" | "chuffing"),
             Kind::Unlisted => effect == "square-times:v:x:v",
             Kind::LeftOut => small[..2].contains(&(system, effect)),
+            Kind::Pair => effect == "linear-leak:h1",
             Kind::Absorbed => matches!(effect, "linear-support" | "sensor-gain:thrust"),
         }
     });
@@ -150,7 +151,7 @@ fn a_small_battery_with_correlated_noise_is_explained() {
             Kind::Null => !matches!(named.0, "tube" | "tanks" | "reactor"),
             Kind::Alien => named.1 == "telegraph-force",
             Kind::Generic => named.1 == "loss:X",
-            Kind::LeftOut | Kind::Absorbed | Kind::Unlisted => false,
+            Kind::LeftOut | Kind::Pair | Kind::Absorbed | Kind::Unlisted => false,
         }
     });
     let results = runner::run(&systems, &cases, plan.threads);

@@ -7,7 +7,7 @@ use starlings_models::effect::library::{GENERIC, family_of};
 
 use crate::case::{Case, Kind};
 use crate::draw::random;
-use crate::systems::System;
+use crate::systems::{System, Truth};
 
 /// Levels of noise in standard deviations of the signal.
 const LEVELS: [f64; 3] = [0.01, 0.03, 0.1];
@@ -101,7 +101,9 @@ fn of_system(index: usize, system: &System, cases: &mut Vec<Case>) {
             system: index,
             kind,
             effect,
+            second: None,
             accepted,
+            accepted_second: Vec::new(),
             without,
             level: 0.0,
             rho: 0.0,
@@ -119,6 +121,14 @@ fn of_system(index: usize, system: &System, cases: &mut Vec<Case>) {
         }
         cases.push(case(Kind::Library, name, truth.accepted(), none()));
         cases.push(case(Kind::LeftOut, name, truth.accepted(), truth.relatives()));
+    }
+    // Each with the next of its system.
+    let listed: Vec<&Truth> =
+        system.truths.iter().filter(|truth| family_of(truth.name) != Some(GENERIC)).collect();
+    for (truth, beside) in listed.iter().zip(listed.iter().skip(1)) {
+        let pair = case(Kind::Pair, Some(truth.name), truth.accepted(), none());
+        let second = Some(beside.name.to_owned());
+        cases.push(Case { second, accepted_second: beside.accepted(), ..pair });
     }
     cases.extend(system.absorbed.iter().map(|t| case(Kind::Absorbed, Some(t.name), t.accepted(), none())));
     let unlisted = system.unlisted_names();

@@ -13,8 +13,8 @@ use starlings_coordinator::study::store::Store;
 use starlings_models::EffectDef;
 
 use crate::case::{Case, Kind, Outcome, Result};
-use crate::draw::{Draw, Noise, draw, noisy, random};
-use crate::information::{refit, refit_with};
+use crate::draw::{Draw, Noise, draw, draw_pair, noisy, random};
+use crate::information::{Refit, refit, refit_with};
 use crate::systems::System;
 use crate::world::{Told, World};
 
@@ -56,12 +56,15 @@ fn worlds<'a>(systems: &'a [System], cases: &[Case]) -> BTreeMap<(usize, usize),
 
 /// Runs one case.
 pub fn one(world: &World<'_>, case: &Case) -> Option<Result> {
-    let draw = draw(world, case.effect.as_deref(), case.seed)?;
+    let draw = match (case.effect.as_deref(), case.second.as_deref()) {
+        (Some(one), Some(other)) => draw_pair(world, [one, other], case.seed)?,
+        (effect, _) => draw(world, effect, case.seed)?,
+    };
     let level = format!("{} {}", case.level, case.n);
     let mut rng =
         random(&[world.system.name, case.effect.as_deref().unwrap_or("null"), "noise", &level], case.seed);
     let (data, noise) = noisy(&draw, case.level, case.rho, &mut rng);
-    let lambda = refit(world, &draw, &noise).map_or(f64::NAN, |refit| refit.misfit);
+    let lambda = lambda(world, &draw, &noise);
     let started = Instant::now();
     let found = explained(world, case, &data, &noise.sd);
     let wall_s = started.elapsed().as_secs_f64();
@@ -90,6 +93,19 @@ pub fn one(world: &World<'_>, case: &Case) -> Option<Result> {
     })
 }
 
+/// The information about what is missing, or about the second one of two.
+fn lambda(world: &World<'_>, draw: &Draw, noise: &Noise) -> f64 {
+    let misfit = |fit: Option<Refit>| fit.map_or(f64::NAN, |refit| refit.misfit);
+    match (&draw.effect, &draw.second) {
+        (Some(one), Some(other)) => {
+            let alone =
+                [one, other].map(|of| misfit(refit_with(world, draw, noise, std::slice::from_ref(of))));
+            alone[0].min(alone[1])
+        }
+        _ => misfit(refit(world, draw, noise)),
+    }
+}
+
 fn explained(
     world: &World<'_>,
     case: &Case,
@@ -111,7 +127,7 @@ fn judged(base: Result, found: &Explanation, draw: &Draw, world: &World<'_>, noi
         .chain(found.tied_with.iter().cloned());
     let named: Vec<String> = sets.map(|set| set.join(" + ")).collect();
     let mut result = Result {
-        outcome: Outcome::of(found, &base.case.accepted),
+        outcome: Outcome::of(found, &base.case),
         named: if found.effects.is_empty() { found.headline.clone() } else { named.join(" | ") },
         told: told(found, &base.case),
         none: found.probabilities.as_ref().map_or(f64::NAN, |of| of.none_of_these),
@@ -130,7 +146,8 @@ fn judged(base: Result, found: &Explanation, draw: &Draw, world: &World<'_>, noi
     }
     if result.outcome == Outcome::Right {
         result.held_out = held_out(found, world, &noise.sd);
-        let same = draw.effect.as_ref().is_some_and(|(def, _)| def.name == found.effects[0].name);
+        let is_it = |(def, _): &(EffectDef, Vec<f64>)| def.name == found.effects[0].name;
+        let same = draw.second.is_none() && draw.effect.as_ref().is_some_and(is_it);
         let amplitude = &found.effects[0].parameters[0];
         result.estimate = same.then_some((amplitude.estimate, amplitude.interval95));
     }
@@ -160,7 +177,7 @@ fn left(found: &Explanation) -> [f64; 4] {
 fn told(found: &Explanation, case: &Case) -> Vec<(f64, bool)> {
     let Some(of) = &found.probabilities else { return Vec::new() };
     let is_unlisted = matches!(case.kind, Kind::LeftOut | Kind::Alien);
-    let is_truth = |names: &[String]| !is_unlisted && names.len() == 1 && case.accepted.contains(&names[0]);
+    let is_truth = |names: &[String]| !is_unlisted && case.is_right(names);
     let sets = of.sets.iter().map(|set| (set.probability, is_truth(&set.names)));
     let others = [
         (of.none_of_these, is_unlisted),

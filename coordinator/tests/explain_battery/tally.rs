@@ -153,10 +153,10 @@ pub fn report(results: &[Result], systems: &[System]) -> String {
 
 /// The rows of a table by what is missing, of those results that `takes` picks.
 fn by_kind(results: &[Result], takes: impl Fn(&Result) -> bool) -> Vec<Group<'_>> {
-    use Kind::{Absorbed, Alien, Generic, LeftOut, Library, Null, Unlisted};
+    use Kind::{Absorbed, Alien, Generic, LeftOut, Library, Null, Pair, Unlisted};
     let informed = |result: &Result| result.lambda > INFORMATION;
     let mut groups = Vec::new();
-    for kind in [Library, Generic, Unlisted, LeftOut, Absorbed, Alien, Null] {
+    for kind in [Library, Generic, Unlisted, LeftOut, Pair, Absorbed, Alien, Null] {
         let is = |result: &Result| result.case.kind == kind && takes(result);
         let word = kind.word();
         if kind == Kind::Null || kind == Kind::Absorbed {
@@ -193,7 +193,7 @@ pub fn csv(results: &[Result], systems: &[System]) -> String {
             "{},{},{},{},{},{},{},{},{:.4e},{},\"{}\",{:.3e},{},{:e},{estimate:e},{lo:e},{hi:e},{:.4},{},{:.4},{:.3},{:.3},{:.3},{:.2e},{:.2},{:.3},\"{}\"",
             systems[case.system].name,
             case.kind.word(),
-            case.effect.as_deref().unwrap_or(""),
+            case.effect.iter().chain(&case.second).map(String::as_str).collect::<Vec<_>>().join(" + "),
             case.level,
             case.rho,
             case.n,
