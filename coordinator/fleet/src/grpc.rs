@@ -28,7 +28,7 @@ use super::network::{self, Ways};
 use super::probe::probe;
 use super::recombination::{Compared, Recombine};
 use super::tally::Readings;
-use super::travel::submission;
+use super::travel::{submission, values};
 use super::{Arrived, Fleet, FleetError, FleetEvent, Held, Outcome, StateStore, StoredState, TELL_EVERY};
 
 /// How long the caller of a batch that was dropped waits for the network's last words.
@@ -281,11 +281,6 @@ impl Drop for GrpcFleet {
             }
         }
     }
-}
-
-/// Outcomes with their states read.
-fn values(outcomes: Vec<Outcome<Held>>) -> Result<Vec<Outcome>, FleetError> {
-    outcomes.into_iter().map(|outcome| Ok(outcome.try_map(Held::into_values)?)).collect()
 }
 
 /// How runs of a setup compare: a program outside promises equal bits, or does not.

@@ -55,6 +55,8 @@ pub struct Case {
     pub accepted: Vec<String>,
     /// Names that are right for the one beside it.
     pub accepted_second: Vec<String>,
+    /// Names that are right by themselves where the data feel one of two only.
+    pub alone: Vec<String>,
     /// Names that the search may not try.
     pub without: Vec<String>,
     /// Noise in standard deviations of the channels.
@@ -73,7 +75,8 @@ impl Case {
     pub fn is_right<T: AsRef<str>>(&self, set: &[T]) -> bool {
         let is_in = |name: &T, list: &[String]| list.iter().any(|known| known == name.as_ref());
         match set {
-            [one] => self.second.is_none() && is_in(one, &self.accepted),
+            [one] if self.second.is_some() => is_in(one, &self.alone),
+            [one] => is_in(one, &self.accepted),
             [one, other] => [(one, other), (other, one)]
                 .iter()
                 .any(|(one, other)| is_in(one, &self.accepted) && is_in(other, &self.accepted_second)),

@@ -104,6 +104,7 @@ fn of_system(index: usize, system: &System, cases: &mut Vec<Case>) {
             second: None,
             accepted,
             accepted_second: Vec::new(),
+            alone: Vec::new(),
             without,
             level: 0.0,
             rho: 0.0,

@@ -13,6 +13,8 @@ use crate::case::{Kind, Result};
 const TOLD: [f64; 7] = [0.0, 0.01, 0.1, 0.5, 0.9, 0.99, 1.0];
 /// Share of the cases whose truth is in no list, as the tool takes it before any data.
 const LEFT_OUT: f64 = 0.1;
+/// Share of the others in which two effects are missing at once, as the tool takes it.
+const PAIRS: f64 = 0.25;
 
 /// The answers that were told with a probability in one interval.
 pub struct Answers {
@@ -35,10 +37,11 @@ impl Answers {
     }
 }
 
-/// The answers by the probability that was told, where one truth in ten is in no list.
+/// The answers by the probability that was told, where one truth in ten is in no list and one in four of the others has two effects.
 pub fn reliability(results: &[Result]) -> Vec<Answers> {
     let weight = |kind: Kind| match kind {
-        Kind::Library => 1.0 - LEFT_OUT,
+        Kind::Library => (1.0 - PAIRS) * (1.0 - LEFT_OUT),
+        Kind::Pair => PAIRS * (1.0 - LEFT_OUT),
         Kind::LeftOut => LEFT_OUT,
         _ => 0.0,
     };

@@ -18,6 +18,9 @@ use crate::information::{Refit, refit, refit_with};
 use crate::systems::System;
 use crate::world::{Told, World};
 
+/// χ² that a model leaves on data without noise below which the data hold next to nothing against it.
+pub const UNFELT: f64 = 30.0;
+
 /// Runs all cases on so many threads; results stand in the order of the cases. A truth that cannot reach the wanted strength
 /// has no result.
 pub fn run(systems: &[System], cases: &[Case], threads: usize) -> Vec<Result> {
@@ -64,7 +67,8 @@ pub fn one(world: &World<'_>, case: &Case) -> Option<Result> {
     let mut rng =
         random(&[world.system.name, case.effect.as_deref().unwrap_or("null"), "noise", &level], case.seed);
     let (data, noise) = noisy(&draw, case.level, case.rho, &mut rng);
-    let lambda = lambda(world, &draw, &noise);
+    let (lambda, case) = informed(world, case, &draw, &noise);
+    let case = &case;
     let started = Instant::now();
     let found = explained(world, case, &data, &noise.sd);
     let wall_s = started.elapsed().as_secs_f64();
@@ -93,17 +97,21 @@ pub fn one(world: &World<'_>, case: &Case) -> Option<Result> {
     })
 }
 
-/// The information about what is missing, or about the second one of two.
-fn lambda(world: &World<'_>, draw: &Draw, noise: &Noise) -> f64 {
+/// The information about what is missing, or about the second one of two; one that the data do not feel need not be named.
+fn informed(world: &World<'_>, case: &Case, draw: &Draw, noise: &Noise) -> (f64, Case) {
     let misfit = |fit: Option<Refit>| fit.map_or(f64::NAN, |refit| refit.misfit);
-    match (&draw.effect, &draw.second) {
-        (Some(one), Some(other)) => {
-            let alone =
-                [one, other].map(|of| misfit(refit_with(world, draw, noise, std::slice::from_ref(of))));
-            alone[0].min(alone[1])
+    let mut case = case.clone();
+    let (Some(one), Some(other)) = (&draw.effect, &draw.second) else {
+        return (misfit(refit(world, draw, noise)), case);
+    };
+    let of = |one| misfit(refit_with(world, draw, noise, std::slice::from_ref(one)));
+    let (one, other) = (of(one), of(other));
+    for (left, names) in [(one, &case.accepted), (other, &case.accepted_second)] {
+        if left < UNFELT {
+            case.alone.extend(names.iter().cloned());
         }
-        _ => misfit(refit(world, draw, noise)),
     }
+    (one.min(other), case)
 }
 
 fn explained(

@@ -6,6 +6,7 @@ use std::fmt::Write as _;
 
 use crate::case::{Kind, Outcome, Result};
 use crate::reliability;
+use crate::runner::UNFELT;
 use crate::systems::System;
 
 /// χ² above which the data carry the information.
@@ -80,7 +81,7 @@ impl<'a> Group<'a> {
     /// Wrong names, and those of them whose misfit to data without noise is below 30.
     fn undetectable(&self) -> (usize, usize) {
         let wrong = self.results.iter().filter(|result| result.outcome == Outcome::Wrong);
-        let near = wrong.clone().filter(|result| result.rival.is_some_and(|rival| rival < 30.0));
+        let near = wrong.clone().filter(|result| result.rival.is_some_and(|rival| rival < UNFELT));
         (wrong.count(), near.count())
     }
 }

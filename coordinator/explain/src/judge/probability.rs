@@ -11,12 +11,17 @@ use super::gates::JudgedFit;
 use super::search_result::SearchResult;
 use super::verdict::{Decision, Verdict};
 use crate::fit::candidate::Candidate;
+use crate::fit::kind::Kind;
 use crate::number::percent;
 
 /// Probability, before any data, that what is missing is in no list.
 const UNLISTED: f64 = 0.1;
 /// How often one name falls where the truth is in no list, over how often where it is ...
 const NAMED: f64 = 0.21;
+/// ... the same of two names together, where one listed truth in four has two effects ...
+const PAIRED: f64 = 0.6;
+/// ... of a proposal, where a truth that nobody listed has as often a form that is proposed as another one ...
+const PROPOSED: f64 = 1.7;
 /// ... the same of a tie ...
 const TIED: f64 = 0.5;
 /// ... and of `unexplained`.
@@ -131,16 +136,19 @@ pub(crate) fn probabilities(
     }
     weights.retain(|(set, _)| !decision.synonyms.contains(&set.names.join(" + ")));
     let is_untested = best.is_some_and(|j| j.adequacy.whiteness.is_none());
-    let of_verdict = odds(decision.verdict, is_untested) * UNLISTED / (1.0 - UNLISTED);
+    let kinds = best.map_or_else(Vec::new, JudgedFit::kinds);
+    let of_verdict = odds(decision.verdict, &kinds, is_untested) * UNLISTED / (1.0 - UNLISTED);
     let listed = 1.0 / (1.0 + of_verdict);
     let left = best.filter(|_| is_answered).map(|j| &j.adequacy);
     let listed = left.map_or(listed, |left| still_listed(listed, left, discrepancy));
     Some(shared(weights, listed, discrepancy).with_gap(found.adequacy.is_gap_of_the_model()))
 }
 
-/// How often a verdict falls where the truth is in no list, over how often where it is.
-fn odds(verdict: Verdict, is_untested: bool) -> f64 {
+/// How often a verdict for effects of these kinds falls where the truth is in no list, over how often where it is.
+fn odds(verdict: Verdict, kinds: &[Kind], is_untested: bool) -> f64 {
     let counted = match verdict {
+        Verdict::Named | Verdict::Tie if kinds.contains(&Kind::Proposal) => PROPOSED,
+        Verdict::Named if kinds.len() > 1 => PAIRED,
         Verdict::Named => NAMED,
         Verdict::Tie => TIED,
         Verdict::Unexplained => UNEXPLAINED,
@@ -232,7 +240,7 @@ mod tests {
     #[test]
     fn a_name_that_no_test_of_correlation_could_refuse_is_worth_no_more_than_the_prior() {
         let listed = |verdict, is_untested| {
-            let of_verdict = odds(verdict, is_untested) * UNLISTED / (1.0 - UNLISTED);
+            let of_verdict = odds(verdict, &[Kind::Library], is_untested) * UNLISTED / (1.0 - UNLISTED);
             1.0 / (1.0 + of_verdict)
         };
         for verdict in [Verdict::Named, Verdict::Tie] {
@@ -240,6 +248,18 @@ mod tests {
             assert!(listed(verdict, false) > listed(verdict, true));
         }
         assert!(listed(Verdict::Unexplained, true) < 0.2, "nothing was named");
+    }
+
+    #[test]
+    fn two_names_are_told_with_less_than_one_and_a_proposal_with_less_than_both() {
+        let of = |verdict, kinds: &[Kind]| odds(verdict, kinds, false);
+        let one = of(Verdict::Named, &[Kind::Generic]);
+        let two = of(Verdict::Named, &[Kind::Library, Kind::Study]);
+        let made = of(Verdict::Named, &[Kind::Proposal]);
+        assert!(one < two && two < made, "{one} {two} {made}");
+        let beside = of(Verdict::Tie, &[Kind::Library, Kind::Proposal]);
+        assert!(beside.total_cmp(&made).is_eq() && of(Verdict::Tie, &[Kind::Library]) < beside);
+        assert!(made < of(Verdict::Unexplained, &[Kind::Proposal]), "what was refused is no proposal");
     }
 
     #[test]
