@@ -48,7 +48,7 @@ impl<T: Message + Send + 'static, U: Message + Default + Send + 'static> tonic::
     }
 }
 
-/// Encodes a message into a buffer of its size.
+/// Encodes a message: a large one into a buffer of its size, a small one first into memory of its own.
 #[derive(Debug)]
 pub(crate) struct Whole<T> {
     /// What small messages are written to first.

@@ -95,7 +95,7 @@ fn a_small_battery_is_explained() {
             Kind::Alien => matches!(effect, "telegraph-force" | "straining" | "chuffing"),
             Kind::Unlisted => effect == "square-times:v:x:v",
             Kind::LeftOut => small[..2].contains(&(system, effect)),
-            Kind::Pair => effect == "linear-leak:h1",
+            Kind::Pair => (system, effect) == ("windkessel", "series-resistance"),
             Kind::Absorbed => matches!(effect, "linear-support" | "sensor-gain:thrust"),
         }
     });
@@ -112,6 +112,9 @@ fn a_small_battery_is_explained() {
         assert_eq!(quiet.count(Outcome::Wrong) + quiet.count(Outcome::TieWithout), 0);
     }
     assert_eq!(of(Kind::Alien).count(Outcome::Wrong), 0);
+    let pairs = of(Kind::Pair);
+    assert!(!pairs.results.is_empty() && pairs.results.iter().all(|r| r.lambda > tally::INFORMATION));
+    assert!((pairs.share(&[Outcome::Right, Outcome::RightInTie]) - 1.0).abs() < 1e-9);
     probabilities_hold(&results);
 }
 

@@ -86,8 +86,9 @@ impl Plan {
         }
         let is_in = |list: &[String], name: &str| list.is_empty() || list.iter().any(|known| known == name);
         cases.retain(|case| {
-            let effect = case.effect.as_deref().unwrap_or_default();
-            is_in(&self.kinds, case.kind.word()) && is_in(&self.effects, effect)
+            let effects =
+                [case.effect.as_deref().unwrap_or_default(), case.second.as_deref().unwrap_or_default()];
+            is_in(&self.kinds, case.kind.word()) && effects.iter().any(|effect| is_in(&self.effects, effect))
         });
         cases
     }

@@ -39,13 +39,9 @@ impl Answers {
 
 /// The answers by the probability that was told, where one truth in ten is in no list and one in four of the others has two effects.
 pub fn reliability(results: &[Result]) -> Vec<Answers> {
-    let weight = |kind: Kind| match kind {
-        Kind::Library => (1.0 - PAIRS) * (1.0 - LEFT_OUT),
-        Kind::Pair => PAIRS * (1.0 - LEFT_OUT),
-        Kind::LeftOut => LEFT_OUT,
-        _ => 0.0,
-    };
-    let told = results.iter().flat_map(|r| r.told.iter().map(|(p, so)| (weight(r.case.kind), *p, *so)));
+    let weights = Weights::of(results);
+    let told =
+        results.iter().flat_map(|r| r.told.iter().map(|(p, so)| (weights.of_kind(r.case.kind), *p, *so)));
     let told: Vec<(f64, f64, bool)> = told.filter(|(weight, ..)| *weight > 0.0).collect();
     let of = |ends: &[f64]| {
         let inside: Vec<_> = told.iter().filter(|(_, p, _)| (ends[0]..ends[1]).contains(p)).collect();
@@ -56,6 +52,35 @@ pub fn reliability(results: &[Result]) -> Vec<Answers> {
         Answers { told: [ends[0], ends[1]], n: inside.len(), mean, so, effective: sum * sum / squares }
     };
     TOLD.windows(2).map(of).filter(|answers| answers.n > 0).collect()
+}
+
+/// What a case of each kind counts, so that the kinds have their shares however many cases they have.
+struct Weights {
+    library: f64,
+    pair: f64,
+    left_out: f64,
+}
+
+impl Weights {
+    fn of(results: &[Result]) -> Self {
+        let count = |kind: Kind| results.iter().filter(|r| r.case.kind == kind).count() as f64;
+        let each = |share: f64, kind: Kind| if count(kind) > 0.0 { share / count(kind) } else { 0.0 };
+        let pairs = if count(Kind::Pair) > 0.0 { PAIRS } else { 0.0 };
+        Self {
+            library: each((1.0 - pairs) * (1.0 - LEFT_OUT), Kind::Library),
+            pair: each(pairs * (1.0 - LEFT_OUT), Kind::Pair),
+            left_out: each(LEFT_OUT, Kind::LeftOut),
+        }
+    }
+
+    fn of_kind(&self, kind: Kind) -> f64 {
+        match kind {
+            Kind::Library => self.library,
+            Kind::Pair => self.pair,
+            Kind::LeftOut => self.left_out,
+            _ => 0.0,
+        }
+    }
 }
 
 /// The same as a table.

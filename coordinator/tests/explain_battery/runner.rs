@@ -111,7 +111,8 @@ fn informed(world: &World<'_>, case: &Case, draw: &Draw, noise: &Noise) -> (f64,
             case.alone.extend(names.iter().cloned());
         }
     }
-    (one.min(other), case)
+    // Of a fit that failed nobody knows.
+    (if one.is_nan() || other.is_nan() { f64::NAN } else { one.min(other) }, case)
 }
 
 fn explained(
@@ -186,12 +187,18 @@ fn told(found: &Explanation, case: &Case) -> Vec<(f64, bool)> {
     let Some(of) = &found.probabilities else { return Vec::new() };
     let is_unlisted = matches!(case.kind, Kind::LeftOut | Kind::Alien);
     let is_truth = |names: &[String]| !is_unlisted && case.is_right(names);
-    let sets = of.sets.iter().map(|set| (set.probability, is_truth(&set.names)));
+    let mut sets: Vec<(f64, bool)> = of.sets.iter().map(|s| (s.probability, is_truth(&s.names))).collect();
+    // With and without an effect that the data do not feel is one truth.
+    if case.second.is_some() && sets.iter().any(|(_, so)| *so) {
+        let right = sets.iter().filter(|(_, so)| *so).map(|(probability, _)| probability).sum();
+        sets.retain(|(_, so)| !so);
+        sets.push((right, true));
+    }
     let others = [
         (of.none_of_these, is_unlisted),
         (of.nothing_missing, matches!(case.kind, Kind::Null | Kind::Absorbed)),
     ];
-    sets.chain(others).collect()
+    sets.into_iter().chain(others).collect()
 }
 
 /// The noise-free misfit of what was named.

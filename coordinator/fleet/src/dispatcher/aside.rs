@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use super::Dispatcher;
 use super::message::{Command, WorkerId};
+use super::roster::Worker;
 use crate::FleetEvent;
 
 /// How long a worker is set aside at first; doubled each time that it fails again, up to [`LONGEST`].
@@ -57,7 +58,9 @@ impl Dispatcher {
 
     /// A run was made by a worker: if it was set aside, it is no longer.
     pub(super) fn works(&mut self, id: WorkerId) {
-        if self.workers.get(id).is_none_or(|worker| worker.aside.is_none()) {
+        // Asked after every run: most of them change nothing, and bring no index up to date.
+        let is_tried = |worker: &Worker| worker.aside.as_ref().is_some_and(|aside| aside.is_due);
+        if !self.workers.get(id).is_some_and(is_tried) {
             return;
         }
         let Some(mut worker) = self.workers.get_mut(id) else { return };
