@@ -28,7 +28,7 @@ use super::network::{self, Ways};
 use super::probe::probe;
 use super::recombination::{Compared, Recombine};
 use super::tally::Readings;
-use super::travel::{submission, values};
+use super::travel::submission;
 use super::{Arrived, Fleet, FleetError, FleetEvent, Held, Outcome, StateStore, StoredState, TELL_EVERY};
 
 /// How long the caller of a batch that was dropped waits for the network's last words.
@@ -224,12 +224,8 @@ impl Fleet for GrpcFleet {
 
     fn run_mixed(&mut self, jobs: Vec<(SetupId, Job)>) -> Result<Vec<Outcome>, FleetError> {
         let jobs = jobs.into_iter().map(|(setup, job)| (setup, job.map(Held::Values)));
-        values(self.run_held(jobs.collect())?)
-    }
-
-    fn run(&mut self, setup: SetupId, jobs: Vec<Job>) -> Result<Vec<Outcome>, FleetError> {
-        let jobs = jobs.into_iter().map(|job| (setup, job.map(Held::Values)));
-        values(self.run_held(jobs.collect())?)
+        let outcomes = self.run_held(jobs.collect())?;
+        outcomes.into_iter().map(|outcome| Ok(outcome.try_map(Held::into_values)?)).collect()
     }
 
     fn run_held(&mut self, jobs: Vec<(SetupId, Job<Held>)>) -> Result<Vec<Outcome<Held>>, FleetError> {

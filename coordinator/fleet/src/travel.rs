@@ -1,4 +1,4 @@
-//! What travels between coordinator and workers: whether a run can, the jobs of a batch as they do, and what came of them.
+//! What travels between coordinator and workers: whether a run can, and the jobs of a batch as they do.
 //!
 //! Next file to read: the module `convert` of `starlings-proto`, which holds the limits.
 
@@ -9,7 +9,7 @@ use starlings_proto::{JobEncoder, ProtocolError, SetupId, State};
 use tokio::sync::oneshot;
 
 use crate::hub::{Reply, Submission};
-use crate::{FleetError, Held, Outcome, StateError, StateStore};
+use crate::{FleetError, Held, StateError, StateStore};
 
 /// Whether a job can travel.
 ///
@@ -52,11 +52,6 @@ pub(crate) fn submission(
     let jobs = jobs.collect::<Result<Vec<_>, StateError>>()?;
     let encoder = JobEncoder::of(jobs.iter().map(|(_, job)| job));
     Ok(Submission { jobs, states, encoder, reply })
-}
-
-/// Outcomes with their states read.
-pub(crate) fn values(outcomes: Vec<Outcome<Held>>) -> Result<Vec<Outcome>, FleetError> {
-    outcomes.into_iter().map(|outcome| Ok(outcome.try_map(Held::into_values)?)).collect()
 }
 
 #[cfg(test)]

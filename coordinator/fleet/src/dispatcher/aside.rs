@@ -58,14 +58,12 @@ impl Dispatcher {
 
     /// A run was made by a worker: if it was set aside, it is no longer.
     pub(super) fn works(&mut self, id: WorkerId) {
-        // Asked after every run: most of them change nothing, and bring no index up to date.
-        let is_tried = |worker: &Worker| worker.aside.as_ref().is_some_and(|aside| aside.is_due);
-        if !self.workers.get(id).is_some_and(is_tried) {
-            return;
-        }
-        let Some(mut worker) = self.workers.get_mut(id) else { return };
-        if worker.aside.take_if(|aside| aside.is_due).is_some() {
-            self.out.push(Command::Notice(FleetEvent::WorkerBack { worker: worker.name.clone() }));
+        // Asked after every run, and mostly nothing changes that an index would have to follow.
+        let is_tried = |worker: &&Worker| worker.aside.as_ref().is_some_and(|aside| aside.is_due);
+        let Some(worker) = self.workers.get(id).filter(is_tried) else { return };
+        self.out.push(Command::Notice(FleetEvent::WorkerBack { worker: worker.name.clone() }));
+        if let Some(mut worker) = self.workers.get_mut(id) {
+            worker.aside = None;
         }
     }
 }

@@ -252,16 +252,14 @@ impl Batch {
         let mut ended = Vec::new();
         for index in self.queue.take_all(key) {
             let attempts = self.attempts(index);
-            match self.jobs[index].earlier.take().map(|earlier| *earlier) {
-                Some(Earlier { end: Ended::Decided(failure), name }) => {
-                    self.end(index, Outcome { result: Err(failure), attempts, worker: name });
-                    ended.push(index);
-                }
-                other => {
-                    self.jobs[index].earlier = other.map(Box::new);
-                    self.jobs[index].avoided = None;
-                    self.requeue(index);
-                }
+            let job = &mut self.jobs[index];
+            let decided = job.earlier.take_if(|earlier| matches!(earlier.end, Ended::Decided(_)));
+            if let Some(Earlier { end: Ended::Decided(failure), name }) = decided.map(|earlier| *earlier) {
+                self.end(index, Outcome { result: Err(failure), attempts, worker: name });
+                ended.push(index);
+            } else {
+                job.avoided = None;
+                self.requeue(index);
             }
         }
         ended
