@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
 /// Third quartile of the standard normal distribution: median of |x| for unit sd.
-const MEDIAN_ABSOLUTE: f64 = 0.674_489_750_196_081_7;
+pub(crate) const MEDIAN_ABSOLUTE: f64 = 0.674_489_750_196_081_7;
 
 /// Degrees of freedom per third difference: the variance of the logarithm of a noise variance found from n of them is 2/(0.21 n).
 /// Neighbours share three of four samples, and a median tells less than a mean square would.
@@ -17,13 +17,17 @@ const FREEDOM: f64 = 0.21;
 /// Differences that touch a NaN are skipped; NaN when none is left. Third differences remove any parabola, and white noise has
 /// third differences of variance 1 + 9 + 9 + 1 = 20; a few jumps hardly change the median.
 pub fn noise_from_third_differences(series: &[f64]) -> f64 {
-    let mut size: Vec<f64> = third_differences(series).map(f64::abs).collect();
-    if size.is_empty() {
+    median(third_differences(series).map(f64::abs)) / (MEDIAN_ABSOLUTE * 20f64.sqrt())
+}
+
+/// The middle one of these values, or the mean of the two in the middle; NaN where there is none.
+pub(crate) fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut sorted: Vec<f64> = values.collect();
+    if sorted.is_empty() {
         return f64::NAN;
     }
-    size.sort_by(f64::total_cmp);
-    let median = 0.5 * (size[(size.len() - 1) / 2] + size[size.len() / 2]);
-    median / (MEDIAN_ABSOLUTE * 20f64.sqrt())
+    sorted.sort_by(f64::total_cmp);
+    0.5 * (sorted[(sorted.len() - 1) / 2] + sorted[sorted.len() / 2])
 }
 
 /// Third differences that touch no NaN.

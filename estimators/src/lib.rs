@@ -32,6 +32,7 @@ mod information;
 mod kind;
 mod least_squares;
 mod linearisation;
+mod outliers;
 mod particles;
 mod pooled;
 mod qr;
@@ -72,6 +73,7 @@ pub use identifiability::{
 pub use kind::{Form, Kind, MakeFilter, Options, Slope};
 pub use least_squares::{End, LeastSquares, Need, Scaled};
 pub use linearisation::Linearisation;
+pub use outliers::{Outlier, outliers};
 pub use particles::Particles;
 pub use pooled::Pooled;
 pub use recombine::{Recombination, recombine};

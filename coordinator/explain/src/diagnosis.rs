@@ -24,6 +24,7 @@ use crate::options::Options;
 use crate::refit::further::{search_further, search_generic_pairs};
 use crate::refit::other_forms::{search_other_forms, sole_effect};
 use crate::refit::search::{first_kinds, search};
+use crate::refit::twins::refit_twins;
 use crate::rounds::Rounds;
 use crate::run_cache::{Course, Point, RunCache};
 use crate::screen::candidates::candidates;
@@ -95,7 +96,7 @@ fn foresee(cache: &mut RunCache<'_>, candidates: &[Candidate], options: &Options
     cache.foreseen.candidates(tried().count(), tried().map(|c| c.points.len()).sum());
 }
 
-/// Decides, and goes on with generic terms, with proposals and with pairs while nothing explains the gap, or with other forms of what explains it.
+/// Decides, refits what cannot be told from it to first order, and goes on with generic terms, with proposals and with pairs while nothing explains the gap, or with other forms of what explains it.
 /// `proposed` takes the candidates with the proposals, where any are made. With the decision come the unknown inputs of the model as it is.
 fn decide_further<'c>(
     cache: &mut RunCache<'_>,
@@ -106,6 +107,11 @@ fn decide_further<'c>(
     options: &Options,
 ) -> Result<(Decision, Vec<UnknownInput>), ExplainError> {
     let mut decision = decide(cache, found, candidates)?;
+    if let Some(told) = decision.best.filter(|_| decision.verdict == Verdict::Tie)
+        && refit_twins(cache, found, candidates, tracks, options, told)?
+    {
+        decision = decide(cache, found, candidates)?;
+    }
     if let Some(wanted) = wanted_of_generic(found, &decision)
         && search_further(cache, found, candidates, tracks, options, (&[Kind::Generic], wanted))?
     {

@@ -224,7 +224,7 @@ fn explanation(
         seed: study.seed,
         verdict: decision.verdict,
         headline: words::headline(cache, found, candidates, decision),
-        probabilities: probabilities(found, candidates, decision, n_train),
+        probabilities: probabilities(&cache.rows, found, candidates, decision),
         places: before.places.clone(),
         effects: added.map(summary::effects).unwrap_or_default(),
         replaced: added.map(|j| j.fit.variant.left_out.clone()).unwrap_or_default(),

@@ -4,6 +4,7 @@
 //! Next file to read: [`crate::file::read`], which fills these.
 
 mod brackets;
+mod channels;
 pub(super) mod diagnose;
 pub(super) mod infer;
 pub(super) mod layout;
@@ -21,6 +22,7 @@ mod table;
 
 use std::ops::Range;
 
+pub(super) use channels::{ChannelSection, Outliers, SurfaceSection};
 use starlings_models::Role;
 use toml::Spanned;
 
@@ -203,38 +205,6 @@ pub(super) struct RecordSection {
     /// Rows of a held-out record from which its start is found.
     pub(super) start_rows: Option<Spanned<u64>>,
     pub(super) every: Spanned<u64>,
-}
-
-/// One entry of `channels`.
-#[derive(Debug)]
-pub(super) struct ChannelSection {
-    pub(super) column: Spanned<String>,
-    pub(super) output: Spanned<String>,
-    /// Label of the column's values; the model's where it is not given.
-    pub(super) unit: Option<Spanned<String>>,
-    /// What the column holds of the output, where not the output itself.
-    pub(super) from: Option<Spanned<String>>,
-    /// Value at which the integral of a rate begins.
-    pub(super) start: Option<Spanned<f64>>,
-    /// Never fitted.
-    pub(super) held_out: bool,
-    /// Standard deviation in the channel's unit; `None` for `"auto"`.
-    pub(super) noise: Spanned<Option<f64>>,
-    /// The surfaces that were measured, in the place of a column.
-    pub(super) surface: Option<SurfaceSection>,
-}
-
-/// The surface part of a channel.
-#[derive(Debug)]
-pub(super) struct SurfaceSection {
-    /// Profiles `time,z,r`, or meshes by `time,file`.
-    pub(super) file: Spanned<String>,
-    /// The nodes without displacement.
-    pub(super) rest: Spanned<String>,
-    /// Open ends of every mesh.
-    pub(super) open_ends: usize,
-    /// Standard deviation of the surface's points across the direction of a node, along the wall; none where it does not matter.
-    pub(super) noise_along: Option<Spanned<f64>>,
 }
 
 /// `[[effects]]`.

@@ -9,6 +9,7 @@ pub(super) mod found_noise;
 #[cfg(fuzzing)]
 pub(crate) mod fuzzing;
 mod input;
+mod left_out;
 mod mesh;
 mod noise;
 mod part;
@@ -180,7 +181,7 @@ impl<'a> Recordings<'a> {
         let times: Vec<f64> = rows.iter().map(|row| table.times[*row]).collect();
         let inputs = inputs(self, section, &table, &times, spec)?;
         context.warnings.extend(training::reaches_beyond(section, &times));
-        context.warnings.extend(start::inputs_before(section, &table, &times, &inputs, spec));
+        context.warnings.extend(start::rows_before(section, &table, &times, &inputs, spec));
         let start = start::of_run(self.source, section, &times);
         let first_rows = start::first_rows(self.source, section, &times, &channels);
         Some(Record {

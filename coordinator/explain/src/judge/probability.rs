@@ -8,11 +8,13 @@ use serde::{Deserialize, Serialize};
 
 use super::adequacy::Adequacy;
 use super::gates::JudgedFit;
+use super::larger_noise::larger;
 use super::search_result::SearchResult;
 use super::verdict::{Decision, Verdict};
 use crate::fit::candidate::Candidate;
 use crate::fit::kind::Kind;
 use crate::number::percent;
+use crate::rows::Rows;
 
 /// Probability, before any data, that what is missing is in no list.
 const UNLISTED: f64 = 0.1;
@@ -66,6 +68,16 @@ impl Probabilities {
         self
     }
 
+    /// Where noise that is correlated and larger than was found could be all that the model leaves, which no count speaks of: that nothing is missing
+    /// is then as probable as that something is which was not tried.
+    fn with_noise(mut self, could_be_noise: bool) -> Self {
+        if could_be_noise {
+            let each = 0.5 * (self.none_of_these + self.nothing_missing);
+            (self.none_of_these, self.nothing_missing) = (each, each);
+        }
+        self
+    }
+
     /// The most probable answers in words, and what is left of the gap.
     pub fn lines(&self) -> Vec<String> {
         let sets = self.sets.iter().take(TOLD).map(|set| {
@@ -83,12 +95,12 @@ impl Probabilities {
     }
 }
 
-/// The probabilities after a verdict; `None` where there is no gap. `n_train` values were fitted.
+/// The probabilities after a verdict; `None` where there is no gap.
 pub(crate) fn probabilities(
+    rows: &Rows,
     found: &SearchResult<'_>,
     candidates: &[Candidate],
     decision: &Decision,
-    n_train: usize,
 ) -> Option<Probabilities> {
     if decision.verdict == Verdict::NoGap {
         return None;
@@ -97,7 +109,7 @@ pub(crate) fn probabilities(
     let counted: Vec<&JudgedFit<'_>> = found.judged.iter().filter(|j| counts(j, is_answered)).collect();
     let best = decision.best.map(|i| &found.judged[i]);
     let nearest = best.or(counted.first().copied());
-    let excess = |chi2: f64| (chi2 - n_train as f64).max(0.0);
+    let excess = |chi2: f64| (chi2 - rows.train.len() as f64).max(0.0);
     let (was, is) = (excess(found.before.train), nearest.map_or(found.before.train, |j| j.misfit.train));
     let discrepancy = if was > 0.0 { (excess(is) / was).min(1.0) } else { 0.0 };
     let inflation = nearest.map_or(found.adequacy.inflation, |j| j.inflation);
@@ -141,7 +153,9 @@ pub(crate) fn probabilities(
     let listed = 1.0 / (1.0 + of_verdict);
     let left = best.filter(|_| is_answered).map(|j| &j.adequacy);
     let listed = left.map_or(listed, |left| still_listed(listed, left, discrepancy));
-    Some(shared(weights, listed, discrepancy).with_gap(found.adequacy.is_gap_of_the_model()))
+    let could_be_noise = !is_answered && !larger(rows, &found.base.predicted).is_empty();
+    let probabilities = shared(weights, listed, discrepancy).with_gap(found.adequacy.is_gap_of_the_model());
+    Some(probabilities.with_noise(could_be_noise))
 }
 
 /// How often a verdict for effects of these kinds falls where the truth is in no list, over how often where it is.
@@ -210,80 +224,4 @@ fn shared(weights: Vec<(ProbableSet, f64)>, listed: f64, discrepancy: f64) -> Pr
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_probabilities_sum_to_one_and_stand_as_the_weights() {
-        let mut weights = Vec::new();
-        for (name, weight) in [("drag", 40.0), ("friction", 37.0), ("drag", 38.0)] {
-            add(&mut weights, vec![name.to_owned()], &[], weight);
-        }
-        let of = shared(weights, 0.9, 0.2);
-        let sum: f64 = of.sets.iter().map(|set| set.probability).sum();
-        // Three sums of exponentials.
-        assert!((sum + of.nothing_missing + of.none_of_these - 1.0).abs() < 1e-12);
-        let [drag, friction] = of.sets.as_slice() else { panic!("{of:?}") };
-        assert_eq!((drag.names[0].as_str(), friction.names[0].as_str()), ("drag", "friction"));
-        assert!((drag.probability / friction.probability - 3.0_f64.exp()).abs() < 1e-9);
-        assert_eq!(
-            of.lines(),
-            [
-                "86 %: drag",
-                "4 %: friction",
-                "10 %: none of these: something that was not tried",
-                "20 % of the gap is left"
-            ]
-        );
-    }
-
-    #[test]
-    fn a_name_that_no_test_of_correlation_could_refuse_is_worth_no_more_than_the_prior() {
-        let listed = |verdict, is_untested| {
-            let of_verdict = odds(verdict, &[Kind::Library], is_untested) * UNLISTED / (1.0 - UNLISTED);
-            1.0 / (1.0 + of_verdict)
-        };
-        for verdict in [Verdict::Named, Verdict::Tie] {
-            assert!((listed(verdict, true) - (1.0 - UNLISTED)).abs() < 1e-12);
-            assert!(listed(verdict, false) > listed(verdict, true));
-        }
-        assert!(listed(Verdict::Unexplained, true) < 0.2, "nothing was named");
-    }
-
-    #[test]
-    fn two_names_are_told_with_less_than_one_and_a_proposal_with_less_than_both() {
-        let of = |verdict, kinds: &[Kind]| odds(verdict, kinds, false);
-        let one = of(Verdict::Named, &[Kind::Generic]);
-        let two = of(Verdict::Named, &[Kind::Library, Kind::Study]);
-        let made = of(Verdict::Named, &[Kind::Proposal]);
-        assert!(one < two && two < made, "{one} {two} {made}");
-        let beside = of(Verdict::Tie, &[Kind::Library, Kind::Proposal]);
-        assert!(beside.total_cmp(&made).is_eq() && of(Verdict::Tie, &[Kind::Library]) < beside);
-        assert!(made < of(Verdict::Unexplained, &[Kind::Proposal]), "what was refused is no proposal");
-    }
-
-    #[test]
-    fn what_is_left_beyond_chance_is_in_no_list() {
-        let left = |rmse_over_noise| Adequacy {
-            n: 200,
-            rmse_over_noise,
-            whiteness: Some(0.4),
-            inflation: 1.5,
-            over_spread: 0.1,
-            noise_freedom: 150.0,
-        };
-        assert!((still_listed(0.95, &left(1.25), 0.5) - 0.475).abs() < 1e-12, "half of the gap");
-        assert!((still_listed(0.95, &left(1.1), 0.5) - 0.95).abs() < 1e-12, "as chance leaves it");
-    }
-
-    #[test]
-    fn without_any_set_nothing_is_missing_or_it_is_in_no_list() {
-        let of = shared(Vec::new(), 0.2, 1.0);
-        assert!((of.nothing_missing - 0.2).abs() < 1e-12 && (of.none_of_these - 0.8).abs() < 1e-12);
-        let of = of.with_gap(true);
-        assert!(
-            of.nothing_missing.abs() < 1e-12 && (of.none_of_these - 1.0).abs() < 1e-12,
-            "a gap is no chance"
-        );
-    }
-}
+mod tests;

@@ -56,14 +56,11 @@ fn end_at(effect: &AddedEffect<'_>, k: usize, value: f64) -> Option<f64> {
     if lo > 0.0 && hi.is_finite() {
         return ends.into_iter().find(|end| (value / end).ln().abs() <= EDGE * (hi / lo).ln());
     }
-    let width = if lo.is_finite() && hi.is_finite() {
-        hi - lo
-    } else if k == 0 {
-        effect.unit
-    } else {
-        candidate.points[0][k - 1].abs()
-    };
-    ends.into_iter().find(|end| end.is_finite() && (value - end).abs() <= EDGE * width)
+    let size = if k == 0 { effect.unit } else { candidate.points[0][k - 1].abs() };
+    let width = if lo.is_finite() && hi.is_finite() { hi - lo } else { size };
+    // The upper end of an amplitude may be far above any that the data could show: that says nothing of how close to zero one is.
+    let near = |end: f64| if k == 0 && end.abs() < f64::MIN_POSITIVE { width.min(size) } else { width };
+    ends.into_iter().find(|end| end.is_finite() && (value - end).abs() <= EDGE * near(*end))
 }
 
 #[cfg(test)]
@@ -107,11 +104,20 @@ mod tests {
             with([0.01, 20.0], vec![1.0]),
         ];
         let candidate = Candidate::new(EffectDef { parameters, ..EffectDef::default() });
+        let with_end = [4e6, 4.0].map(|end| {
+            let parameters = vec![with([0.0, end], vec![])];
+            Candidate::new(EffectDef { parameters, ..EffectDef::default() })
+        });
+        let bounded =
+            |unit: f64| AddedEffect { candidate: &with_end[usize::from(unit < 1.0)], index: 0, unit };
         // The amplitude's unit is not that of the threshold inside the term: thousands against ones, or thousandths.
         for unit in [4000.0, 4e-3] {
             let effect = AddedEffect { candidate: &candidate, index: 0, unit };
             assert_eq!(end_at(&effect, 0, 0.004 * unit), Some(0.0));
             assert_eq!(end_at(&effect, 0, 0.006 * unit), None);
+            assert_eq!(end_at(&bounded(unit), 0, 0.006 * unit), None, "whatever its upper end");
+            assert_eq!(end_at(&bounded(unit), 0, 0.004 * unit), Some(0.0));
+            assert_eq!(end_at(&bounded(unit), 0, 0.997e3 * unit), Some(1e3 * unit));
             assert_eq!(end_at(&effect, 1, 2.6), None, "a fifth of its size away, unit {unit}");
             assert_eq!(end_at(&effect, 1, 2.01), Some(2.0), "a three hundredth of it away, unit {unit}");
             assert_eq!(end_at(&effect, 2, 9.96), Some(10.0));

@@ -11,17 +11,15 @@ use super::gates::JudgedFit;
 use super::objections::{nearest_refused, objection};
 use super::rivals::{MARGIN, rivals};
 use super::search_result::SearchResult;
+use super::twins::twins;
 use crate::error::ExplainError;
 use crate::fit::candidate::Candidate;
 use crate::fit::kind::Kind;
 use crate::fit::model_variant::AddedEffect;
 use crate::fit::same_form::same_form;
 use crate::run_cache::RunCache;
-use crate::screen::screening_result::ScreeningResult;
 use serde::{Deserialize, Serialize};
 
-/// Correlation of two influences above which no refit can tell their candidates apart.
-pub(crate) const ALIKE: f64 = 0.995;
 /// Fall of χ² by a fully modulated form that the data must allow before a form counts as tested. A form modulated by half makes a
 /// quarter of it, which exceeds the 12 units of the check of the form nine times in ten: 4 (√12 + 1.28)².
 const POWER: f64 = 90.0;
@@ -176,7 +174,8 @@ fn class(
     let refitted = found.judged.iter().filter(|j| is_other_name(j));
     let mut synonyms: Vec<String> = refitted.map(|j| j.names().join(" + ")).collect();
     let mut tied: Vec<Vec<String>> = rivals.iter().map(|i| found.judged[*i].names()).collect();
-    for twin in twins(cache, found, judged, candidates)? {
+    for twin in twins(cache, found, judged, candidates)?.iter().filter(|twin| twin.is_tied()) {
+        let twin = vec![twin.candidate.name().to_owned()];
         if is_same(&twin) {
             synonyms.extend(twin);
         } else if !tied.contains(&twin) {
@@ -220,43 +219,6 @@ fn n_operations(term: &str) -> Option<usize> {
     let resolve = |_: &str| Some(Slot::Parameter(0));
     let unsigned = Expression::parse(term.trim_start_matches('-')).ok()?;
     Some(unsigned.compile(&resolve, &|_| None).ok()?.n_operations())
-}
-
-/// Candidates that were not refitted and whose influence cannot be told from that of the best. Of forms that stand for no cause, which are
-/// made by the dozen and of which the nearest were refitted, those where the part of the gain that the two do not share is within the margin
-/// too.
-fn twins(
-    cache: &RunCache<'_>,
-    found: &SearchResult<'_>,
-    judged: &JudgedFit<'_>,
-    candidates: &[Candidate],
-) -> Result<Vec<Vec<String>>, ExplainError> {
-    let [effect] = judged.fit.variant.effects.as_slice() else { return Ok(Vec::new()) };
-    let Ok(optimum) = found.base.optimum() else { return Ok(Vec::new()) };
-    let own = |result: &ScreeningResult| {
-        Ok::<_, ExplainError>(optimum.unimitated(&result.influence.of_train(cache)?))
-    };
-    let best = found.screening.iter().filter(|h| h.candidate == effect.index && h.failure.is_none());
-    let Some(best) = best.max_by(|a, b| a.score.gain.total_cmp(&b.score.gain)) else { return Ok(Vec::new()) };
-    let (gain, best) = (best.score.gain, own(best)?);
-    let mut twins: Vec<Vec<String>> = Vec::new();
-    for result in found.screening.iter().filter(|h| h.failure.is_none() && !h.is_absorbed()) {
-        let refitted = found
-            .judged
-            .iter()
-            .any(|j| j.fit.variant.effects.len() == 1 && j.fit.variant.effects[0].index == result.candidate);
-        let other = own(result)?;
-        let alike = best.dot(&other).abs() / (best.norm() * other.norm());
-        let candidate = &candidates[result.candidate];
-        let name = vec![candidate.name().to_owned()];
-        let allowed = result.allowed_gain(candidate.sign()) > 0.0;
-        let is_told_apart =
-            candidate.kind.is_of_no_field() && gain * (1.0 - alike * alike) > MARGIN * judged.inflation;
-        if !refitted && allowed && alike > ALIKE && !is_told_apart && !twins.contains(&name) {
-            twins.push(name);
-        }
-    }
-    Ok(twins)
 }
 
 #[cfg(test)]

@@ -16,7 +16,7 @@ use crate::fit::model_variant::{AddedEffect, ModelVariant};
 use crate::judge::contribution::SECOND_SHARE;
 use crate::judge::effective_noise::inflation;
 use crate::judge::search_result::SearchResult;
-use crate::judge::verdict::ALIKE;
+use crate::judge::twins::ALIKE;
 use crate::run_cache::Course;
 use crate::screen::screening_result::ScreeningResult;
 

@@ -42,7 +42,7 @@ pub(super) struct Searcher<'s, 'l, 'c> {
 }
 
 /// Kinds that are tried first, and those that are where effects are asked for by name.
-const FIRST: &[Kind] = &[Kind::Study, Kind::Library, Kind::Instrument];
+pub(super) const FIRST: &[Kind] = &[Kind::Study, Kind::Library, Kind::Instrument];
 pub(super) const ASKED: &[Kind] = &[Kind::Study, Kind::Library, Kind::Generic, Kind::Instrument];
 
 /// The kinds that a search tries first.

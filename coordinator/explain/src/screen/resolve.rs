@@ -4,6 +4,7 @@
 //! of the model. Next file to read: [`super::natural_amplitude`].
 
 use starlings_models::effect::{EffectDef, Scale, scale};
+use starlings_models::equations::Expression;
 use starlings_study::{Record, Study};
 
 use super::candidates::kind_of;
@@ -21,9 +22,8 @@ pub(crate) fn resolved_candidates(
     let mut candidates = kinded(study, resolved(study, defs, tracks, periods, change_points));
     for candidate in &mut candidates {
         let Some(def) = defs.iter().find(|def| def.name == candidate.def.name) else { continue };
-        let is_instant =
-            |name: &str| def.parameters.iter().any(|p| p.name == name && p.scale == Scale::Record);
-        let places = candidate.def.parameters.iter().enumerate().filter(|(_, p)| is_instant(&p.name));
+        let instants = instants(def);
+        let places = candidate.def.parameters.iter().enumerate().filter(|(_, p)| instants.contains(&p.name));
         candidate.instants = places.map(|(k, _)| (k, sampling(study))).collect();
     }
     candidates
@@ -36,6 +36,24 @@ pub(crate) fn kinded(study: &Study, defs: impl IntoIterator<Item = EffectDef>) -
         Candidate::new(def).of_kind(kind)
     };
     defs.into_iter().map(candidate).collect()
+}
+
+/// The instants among the parameters of an effect: those that count in parts of the record, and those at which a term switches in time, as
+/// `t_on` in `step(t - t_on)`.
+fn instants(def: &EffectDef) -> Vec<String> {
+    let terms = def.adds.iter().map(|add| &add.term).chain(def.states.iter().map(|state| &state.rate));
+    let parsed = terms.filter_map(|term| Expression::parse(term).ok());
+    let switches: Vec<Expression> = parsed.flat_map(|term| term.discontinuities()).collect();
+    let is_own = |name: &str| def.parameters.iter().any(|parameter| parameter.name == name);
+    let switches_at = |name: &str| {
+        switches.iter().any(|at| {
+            let names = at.names();
+            at.uses_time() && names.iter().any(|(n, _)| n == name) && names.iter().all(|(n, _)| is_own(n))
+        })
+    };
+    let inner = def.parameters.iter().skip(1);
+    let instants = inner.filter(|p| p.scale == Scale::Record || switches_at(&p.name));
+    instants.map(|p| p.name.clone()).collect()
 }
 
 /// The effects with their numbers in the model's units. An effect whose quantity is constant along the run is left out, since its
@@ -63,7 +81,7 @@ fn resolved(
                 |values: &[f64]| values.iter().copied().filter(|v| lo < *v && *v < hi).collect::<Vec<_>>();
             match wanted.scale {
                 Scale::Duration if !within(periods).is_empty() => parameter.grid = within(periods),
-                Scale::Record => parameter.grid.extend(within(change_points)),
+                _ if instants(def).contains(&wanted.name) => parameter.grid.extend(within(change_points)),
                 _ => {}
             }
         }
@@ -79,4 +97,26 @@ fn sampling(study: &Study) -> f64 {
         record.map(|r| r.times.windows(2).map(|w| w[1] - w[0]).collect()).unwrap_or_default();
     steps.sort_by(f64::total_cmp);
     steps.get(steps.len() / 2).copied().unwrap_or(1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use starlings_models::effect::{Addition, EffectParameter};
+
+    #[test]
+    fn a_parameter_at_which_a_term_switches_in_time_is_an_instant() {
+        let of = |term: &str| {
+            let named = |name: &str| EffectParameter { name: name.to_owned(), ..EffectParameter::default() };
+            let adds = vec![Addition { to: "sensor:y".to_owned(), term: term.to_owned() }];
+            let parameters = vec![named("size"), named("t_on"), named("level")];
+            instants(&EffectDef { adds, parameters, ..EffectDef::default() })
+        };
+        assert_eq!(of("size*step(t - t_on)"), ["t_on"]);
+        assert_eq!(of("size*max(2*(t - t_on), 0)"), ["t_on"]);
+        assert_eq!(of("if(t > t_on, size*x, 0)"), ["t_on"]);
+        assert_eq!(of("size*step(x - level)"), [""; 0], "a threshold of a state");
+        assert_eq!(of("size*sign(x - level*t)"), [""; 0], "a line in time that a state crosses");
+        assert_eq!(of("size*exp(-t/t_on)"), [""; 0], "a time constant");
+    }
 }

@@ -11,9 +11,9 @@ use super::checked;
 use super::load::Purpose;
 use crate::checked::Study;
 use crate::diagnosis::{Diagnosis, Scenario};
-use crate::file::StudyFile;
 use crate::file::diagnose::{DiagnoseSection, ScenarioSection};
 use crate::file::read::read;
+use crate::file::{Outliers, StudyFile};
 use crate::problem::{Source, StudyError};
 use crate::solver_host::SolverHost;
 
@@ -36,6 +36,7 @@ pub(super) fn diagnosis(path: &Path, text: &str, host: &SolverHost) -> Result<Di
     check_section(&source, &section);
     source.verdict()?;
     file.needs_parameter = false;
+    keep_outliers(&mut file);
     let healthy = checked(path, &source, file, (host, Purpose::Runs))?;
     let scenario = |at| scenario(path, text, at, &healthy, host);
     let scenarios = (0..section.scenarios.len()).map(scenario).collect::<Result<_, _>>()?;
@@ -124,11 +125,20 @@ fn scenario(
     let (name, says) = (section.name.get_ref().clone(), std::mem::take(&mut section.says));
     let weight = section.weight.take().map_or(1.0, Spanned::into_inner);
     enter(&mut file, section);
+    keep_outliers(&mut file);
     let mut study = checked(path, &source, file, (host, Purpose::Runs))?;
     let grid = grid.into_iter().filter_map(|starts| starts_of(&source, &study, starts)).collect();
     source.verdict()?;
     study.warnings.retain(|warning| !healthy.warnings.contains(warning));
     Ok(Scenario { name, says, weight, study, grid })
+}
+
+/// A value that stands apart may be the fault that is looked for.
+fn keep_outliers(file: &mut StudyFile) {
+    for channel in file.records.iter_mut().flat_map(|record| &mut record.channels) {
+        let at = channel.column.span();
+        channel.outliers.get_or_insert(Spanned::new(at, Outliers::Keep));
+    }
 }
 
 /// Puts what a scenario has in the place of what the study has.

@@ -7,12 +7,12 @@ use starlings_proto::adapters::AdapterDef;
 use toml::Spanned;
 use toml::de::DeTable;
 
+use super::channels::{channels, held_out};
 use super::model::{effects, model};
 use super::settings::{estimator, explain, fleet};
-use super::table::{Node, Table, named_texts, number, wrong_type};
+use super::table::{Table, named_texts};
 use super::{
-    ChannelSection, ObserverSection, ParameterSection, PriorSection, ProcessSection, RecordSection,
-    StudyFile, StudySection, SurfaceSection,
+    ObserverSection, ParameterSection, PriorSection, ProcessSection, RecordSection, StudyFile, StudySection,
 };
 use crate::problem::{Source, StudyError};
 
@@ -186,107 +186,4 @@ fn records(source: &Source, root: &Table<'_>) -> Vec<RecordSection> {
         });
     }
     records
-}
-
-/// Whether a record, or a channel, is to be left out of every fit.
-fn held_out(source: &Source, of: &Table<'_>) -> bool {
-    match of.text("use") {
-        None => false,
-        Some(text) if text.get_ref() == "held-out" => true,
-        Some(text) if text.get_ref() == "train" => false,
-        Some(text) => {
-            let valid = ["train".to_owned(), "held-out".to_owned()];
-            source.report_unknown(text.span(), format!("unknown use `{}`", text.get_ref()), &valid);
-            false
-        }
-    }
-}
-
-/// The channels of a record; an inference finds their noise by itself.
-fn channels(source: &Source, record: &Table<'_>, infers: bool) -> Vec<ChannelSection> {
-    let read = |t: Table<'_>| {
-        let noise = t.get("noise").and_then(|node| noise(source, node));
-        if t.get("noise").is_none() && !infers {
-            t.missing("noise", "the standard deviation in the channel's unit, or \"auto\"");
-        }
-        let surface = surface(source, &t);
-        ChannelSection {
-            column: match &surface {
-                Some(surface) => surface.file.clone(),
-                None => t.required_text("column", "a column of the record's file, or a `surface`"),
-            },
-            output: t.required_text("output", "the output of the model that was measured"),
-            unit: t.text("unit"),
-            from: t.text("from"),
-            start: t.number("start"),
-            held_out: held_out(source, &t),
-            noise: noise.unwrap_or_else(|| Spanned::new(t.span.clone(), None)),
-            surface,
-        }
-    };
-    let keys = [
-        "column",
-        "output",
-        "unit",
-        "noise",
-        "use",
-        "from",
-        "start",
-        "surface",
-        "rest",
-        "open_ends",
-        "noise_along",
-    ];
-    record.tables("channels", "a channel", &keys).into_iter().map(read).collect()
-}
-
-/// Open ends of a mesh where the study does not say: a tube's.
-const TUBE_ENDS: usize = 2;
-
-/// The surface part of a channel; nothing where it has a column.
-fn surface(source: &Source, t: &Table<'_>) -> Option<SurfaceSection> {
-    if t.get("surface").is_none() {
-        for key in ["rest", "open_ends", "noise_along"] {
-            if let Some(span) = t.key_span(key) {
-                source.report_with(
-                    span,
-                    format!("`{key}` belongs to a `surface`"),
-                    "remove it, or give `surface`",
-                );
-            }
-        }
-        return None;
-    }
-    for key in ["column", "from", "start"] {
-        if let Some(span) = t.key_span(key) {
-            let message = format!("a channel with a `surface` has no `{key}`");
-            source.report_with(
-                span,
-                message,
-                "remove it: the observed value is a distance of zero to the surface",
-            );
-        }
-    }
-    let ends =
-        t.count("open_ends").map_or(TUBE_ENDS, |n| usize::try_from(*n.get_ref()).unwrap_or(usize::MAX));
-    Some(SurfaceSection {
-        file: t.required_text("surface", "a CSV file of profiles or meshes"),
-        rest: t.required_text(
-            "rest",
-            "a CSV file with the place of every node of the output without displacement",
-        ),
-        open_ends: ends,
-        noise_along: t.number("noise_along"),
-    })
-}
-
-fn noise(source: &Source, node: &Node<'_>) -> Option<Spanned<Option<f64>>> {
-    match node.get_ref().as_str() {
-        Some("auto") => Some(Spanned::new(node.span(), None)),
-        Some(_) => {
-            wrong_type(source, node, "`noise`", "a number or \"auto\"");
-            None
-        }
-        None => number(source, node, "`noise`").map(|n| Spanned::new(n.span(), Some(n.into_inner()))),
-    }
 }

@@ -58,6 +58,7 @@ impl ChannelReader<'_> {
         // A component without any value is treated like one that the file lacks.
         context.warnings.extend(self.empty_columns(&measured));
         measured.retain(|(values, _)| measured_somewhere(values));
+        context.warnings.extend(self.leave_out(section, &mut measured));
         if !measured.iter().any(|(values, _)| self.has_value(&self.derive(derived, values))) {
             self.no_value(section, measured.is_empty());
             return None;

@@ -25,9 +25,9 @@ pub(super) fn of_run(source: &Source, section: &RecordSection, times: &[f64]) ->
     None
 }
 
-/// Inputs in rows of the record's own file before the first measured one: a dose that is given before the first sample, say. An input of
-/// another file keeps its own times.
-pub(super) fn inputs_before(
+/// Rows of the record's own file before the first measured one, where nothing says that the run begins there: a dose that is given before the first
+/// sample, or a first value that is missing. An input of another file keeps its own times.
+pub(super) fn rows_before(
     section: &RecordSection,
     table: &Table,
     times: &[f64],
@@ -42,11 +42,19 @@ pub(super) fn inputs_before(
             .any(|(input, column)| input.get_ref() == name && table.csv.headers.contains(column.get_ref()))
     };
     let own = spec.inputs.iter().zip(inputs).filter(|(input, _)| is_own(&input.name));
-    let earliest = own.filter_map(|(_, signal)| signal.times.first().copied()).reduce(f64::min)?;
+    let of_inputs = own.filter_map(|(_, signal)| signal.times.first().copied()).reduce(f64::min);
+    let (earliest, cure) = match of_inputs.filter(|time| *time < first) {
+        Some(time) => (time, "where the model is to feel them, with its initial values at that time"),
+        None => (*table.times.first()?, "where the initial values are those at that time"),
+    };
+    let what = if of_inputs.is_some_and(|time| time < first) {
+        format!("its inputs from {earliest} on act before that on nothing but delays")
+    } else {
+        format!("the rows of `{}` from {earliest} on hold no value before that", section.file.get_ref())
+    };
     (section.start.is_none() && earliest < first).then(|| {
         format!(
-            "record `{}` begins with its first measured row, at {first}: its inputs from {earliest} on act before that on nothing but \
-             delays. Write `start = {earliest}` in the record where the model is to feel them, with its initial values at that time; \
+            "record `{}` begins with its first measured row, at {first}: {what}. Write `start = {earliest}` in the record {cure}; \
              `start = {first}` keeps the run as it is.",
             section.name.get_ref()
         )

@@ -48,7 +48,7 @@ impl Expression {
     }
 
     /// Whether `t` stands in it.
-    pub(crate) fn uses_time(&self) -> bool {
+    pub fn uses_time(&self) -> bool {
         let mut found = false;
         self.node.walk(&mut |part| found |= matches!(part, Node::Time));
         found

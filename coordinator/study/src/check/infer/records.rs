@@ -40,6 +40,14 @@ fn record(source: &Source, section: &RecordSection, equations: &EquationsDef) ->
     for (key, span) in start.into_iter().chain(rows) {
         source.report_with(span, format!("an inference makes no runs that `{key}` could begin"), "remove it");
     }
+    let said = section.channels.iter().filter_map(|channel| channel.outliers.as_ref());
+    for outliers in said {
+        source.report_with(
+            outliers.span(),
+            "an inference uses every value: `outliers` says nothing to it",
+            "remove it",
+        );
+    }
     let before = source.count();
     let mut columns = Vec::new();
     for channel in &section.channels {

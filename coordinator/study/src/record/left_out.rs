@@ -1,0 +1,90 @@
+//! Values that stand apart from all around them, which no course of a system explains: they count as missing, and are told.
+//!
+//! Next file to read: `outliers.rs` of the estimators, for what is one.
+
+use starlings_estimators::{Outlier, outliers};
+use starlings_models::quoted_list;
+use starlings_models::units::rounded;
+
+use super::part::Part;
+use super::reader::ChannelReader;
+use crate::file::{ChannelSection, Outliers};
+
+/// Of the values of a column, one in so many may be left out; where more stand apart, that is how the signal or its noise is.
+const ONE_IN: usize = 50;
+
+/// Lines that a warning names; of more it tells their number.
+const NAMED: usize = 3;
+
+impl ChannelReader<'_> {
+    /// Takes outliers out of the values of a channel, or of the components of one that is a field, and says so.
+    pub(super) fn leave_out(
+        &self,
+        section: &ChannelSection,
+        measured: &mut [(Vec<f64>, Part)],
+    ) -> Option<String> {
+        if section.outliers.as_ref().is_some_and(|said| *said.get_ref() == Outliers::Keep) {
+            return None;
+        }
+        let noise = *section.noise.get_ref();
+        let (mut left_out, mut too_many) = (Vec::new(), Vec::new());
+        for (values, part) in measured {
+            let found = outliers(&self.table.times, values, noise);
+            let n = values.iter().filter(|value| value.is_finite()).count();
+            if found.len() > (n / ONE_IN).max(1) {
+                too_many.push((found.len(), n, part.column.clone()));
+                continue;
+            }
+            for outlier in found {
+                values[outlier.at] = f64::NAN;
+                left_out.push((outlier, part.column.clone()));
+            }
+        }
+        let said = [self.said_left_out(&left_out), self.said_kept(&too_many)];
+        let said: Vec<String> = said.into_iter().flatten().collect();
+        (!said.is_empty()).then(|| said.join("; "))
+    }
+
+    fn said_left_out(&self, left_out: &[(Outlier, String)]) -> Option<String> {
+        let (first, _) = left_out.first()?;
+        let mut columns: Vec<&str> = left_out.iter().map(|(_, column)| column.as_str()).collect();
+        columns.dedup();
+        let lines =
+            left_out.iter().take(NAMED).map(|(outlier, _)| self.table.csv.line(outlier.at).to_string());
+        let lines = lines.collect::<Vec<_>>().join(", ");
+        let more = left_out.len().saturating_sub(NAMED);
+        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        let least = left_out.iter().map(|(outlier, _)| outlier.times).fold(first.times, f64::min);
+        let (of, are, line, they) = match left_out.len() {
+            1 => ("a value".to_owned(), "is", "line", "it is"),
+            n => (format!("{n} values"), "are", "lines", "each is"),
+        };
+        Some(format!(
+            "{of} in {} of record `{}` {are} left out ({line} {lines}{more} of `{}`): {they} {} times as far from its neighbours on both sides as \
+             values there are, while these agree, which is a fault of the sensor and no course of a system; `outliers = \"keep\"` in \
+             the channel keeps {}",
+            columns_in_words(&columns),
+            self.name(),
+            self.section.file.get_ref(),
+            rounded(least, 2),
+            if left_out.len() == 1 { "it" } else { "them" },
+        ))
+    }
+
+    fn said_kept(&self, too_many: &[(usize, usize, String)]) -> Option<String> {
+        let (found, n, column) = too_many.first()?;
+        Some(format!(
+            "{found} of {n} values in column `{column}` of record `{}` stand apart from their neighbours, too many to be left out as faults of \
+             single values: the signal has pulses, or its noise heavy tails",
+            self.name()
+        ))
+    }
+}
+
+fn columns_in_words(columns: &[&str]) -> String {
+    match columns {
+        [one] => format!("column `{one}`"),
+        some if some.len() <= NAMED => format!("columns {}", quoted_list(some)),
+        many => format!("{} columns", many.len()),
+    }
+}
