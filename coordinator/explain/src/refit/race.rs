@@ -17,7 +17,7 @@ const FINAL: usize = 3;
 /// Candidates with the best scores that are refitted whatever the race says.
 const SCORED: usize = 2;
 /// Of at most so many candidates all are refitted, since a linear score can be wrong where the misfit is large.
-const SMALL: usize = 6;
+pub(super) const SMALL: usize = 6;
 /// Further candidates are refitted when the race promises a cost within this many units of the effective noise of the best.
 const CLOSE: f64 = 12.0;
 

@@ -2,6 +2,7 @@
 //!
 //! Next file to read: [`crate::judge::twins`].
 
+use super::race::SMALL;
 use super::search::{FIRST, Searcher};
 use crate::error::ExplainError;
 use crate::fit::candidate::Candidate;
@@ -37,8 +38,11 @@ pub(crate) fn refit_twins<'c>(
     let mut searcher = Searcher { cache, candidates, tracks, cut_short: false, asked: false, tried: FIRST };
     searcher.cache.foreseen.goes(Course::Open);
     let best = searcher.best_of_each(&apart);
-    let fits = searcher.race_and_refit(&found.base, &best, &found.screening)?;
-    searcher.judge_all(found, fits)?;
+    // As many at a time as are refitted without a race, whose steps are too short to tell them apart.
+    for some in best.chunks(SMALL) {
+        let fits = searcher.race_and_refit(&found.base, some, &found.screening)?;
+        searcher.judge_all(found, fits)?;
+    }
     if found.judged.first().is_some_and(|first| first.leftover.is_none()) {
         searcher.second_pass(found, &Options { max_effects: 1, ..options.clone() })?;
     }
