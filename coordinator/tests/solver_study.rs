@@ -8,6 +8,8 @@ mod explained;
 mod inside;
 #[path = "solver_study/messages.rs"]
 mod messages;
+#[path = "solver_study/rounded.rs"]
+mod rounded;
 mod study_kit;
 #[path = "solver_study/swing.rs"]
 mod swing;

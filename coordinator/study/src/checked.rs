@@ -168,6 +168,8 @@ pub struct EstimatorChoice {
     pub anneal: f64,
     /// Width of the sigma points: of the prior sd from the filter's second pass on, of the posterior sd in the batch fit.
     pub spread: f64,
+    /// Whether the study gives that width.
+    pub is_spread_given: bool,
     /// Resample states and parameters before an analysis, for sets of more than p + 1 points.
     pub resample: bool,
     /// Ensembles of the batch fit at most.

@@ -20,6 +20,8 @@ use starlings_solver::adapters;
 pub(crate) struct Inside {
     model: ModelDef,
     description: Description,
+    /// Digits after the point of its outputs, where it does not give all.
+    decimals: Option<i32>,
 }
 
 /// A host that starts no solver.
@@ -40,12 +42,18 @@ impl Inside {
             observers: vec!["nudging".to_owned()],
             hosts: hosts.iter().map(|name| (*name).to_owned()).collect(),
         };
-        Self { model, description }
+        Self { model, description, decimals: None }
     }
 
     /// The same with another description.
     pub(crate) fn described(mut self, change: impl FnOnce(&mut Description)) -> Self {
         change(&mut self.description);
+        self
+    }
+
+    /// The same with so many digits after the point of its outputs.
+    pub(crate) fn rounding(mut self, decimals: i32) -> Self {
+        self.decimals = Some(decimals);
         self
     }
 
@@ -115,7 +123,11 @@ impl Solve for Inside {
         };
         let prediction = setup.build().map_err(broken)?.run(&job)?;
         let state = if self.description.spec.restart { prediction.state } else { Vec::new() };
-        Ok(Solved { outputs: prediction.outputs, state })
+        let shown = |value: f64| match self.decimals {
+            Some(decimals) => (value * 10.0_f64.powi(decimals)).round() / 10.0_f64.powi(decimals),
+            None => value,
+        };
+        Ok(Solved { outputs: prediction.outputs.into_iter().map(shown).collect(), state })
     }
 }
 

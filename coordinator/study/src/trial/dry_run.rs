@@ -11,7 +11,7 @@ use starlings_fleet::Held;
 use starlings_models::external::table::is_transposed;
 use starlings_models::{Prediction, Window};
 
-use super::{Fault, Here, Runner, TrialChannel, TrialError, asked, named, run, trial_by};
+use super::{Fault, Here, Runner, TrialChannel, TrialError, asked, named, rounding, run, trial_by};
 use crate::predicted::members::setup_of;
 use crate::{Study, posterior};
 
@@ -77,6 +77,7 @@ pub(super) fn dry_run_by(
             ));
         }
     }
+    rounding::heed(study, kind, model);
     Ok(channels)
 }
 

@@ -38,6 +38,7 @@ pub enum FleetTrialError {
 #[derive(Serialize, Deserialize)]
 struct Found {
     whole_answers: bool,
+    spread: f64,
     warnings: Vec<String>,
 }
 
@@ -53,6 +54,7 @@ pub fn trial_on_fleet(
 ) -> Result<(), FleetTrialError> {
     if let Some(found) = store.map(read).transpose()?.flatten() {
         (study.whole_answers, study.warnings) = (found.whole_answers, found.warnings);
+        study.estimator.spread = found.spread;
         return Ok(());
     }
     let setup = study.setup.clone();
@@ -66,7 +68,8 @@ pub fn trial_on_fleet(
     }
     study.warnings.retain(|warning| !warning.contains(check::UNTRIED));
     if let Some(store) = store {
-        let found = Found { whole_answers: study.whole_answers, warnings: study.warnings.clone() };
+        let (whole_answers, spread) = (study.whole_answers, study.estimator.spread);
+        let found = Found { whole_answers, spread, warnings: study.warnings.clone() };
         store.set_meta(FOUND, &json(&found))?;
     }
     Ok(())
