@@ -30,6 +30,7 @@ const EITHER: &[&str] = &[
     "burn-rate-shift",
     "external-pressure",
     "sensor-offset",
+    "sensor-step",
     "sensor-drift",
     "sensor-gain",
     "input-gain",

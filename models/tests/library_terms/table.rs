@@ -136,6 +136,7 @@ pub(crate) const TABLE: &[Case] = &[
     case("chamber", "uneven-burn-out", &[1.2, 0.3], &[Instead("Ab", "(Ab*max(1 - 1.2*max(w - 0.3, 0), 0))")]),
     case("chamber", "back-pressure", &[0.6], &[Output("thrust", "max(1.4*At*p - 0.6, 0)")]),
     case("ramp", "sensor-offset", &[0.3], &[Output("y", "sin(8*t) + 0.3")]),
+    case("ramp", "sensor-step", &[0.3, 0.4], &[Output("y", "sin(8*t) + 0.3*step(t - 0.4)")]),
     case("ramp", "sensor-drift", &[0.3, 0.1], &[Output("y", "sin(8*t) + 0.3*t - 0.03")]),
     case("ramp", "sensor-gain", &[0.3], &[Output("y", "1.3*sin(8*t)")]),
     // What is not known of the time before the record is as at its start.

@@ -208,7 +208,8 @@ impl<'c> Searcher<'_, '_, 'c> {
         Ok((self.refit(fits)?, to_settle))
     }
 
-    /// The best point of the grid of every candidate, by the first screening.
+    /// The best point of the grid of every candidate, by the first screening; of one that changes at an instant all of them, since what changes
+    /// beside another effect need not be where the gap as a whole does.
     pub(super) fn best_points(&self, screening: &[ScreeningResult]) -> Vec<(usize, usize)> {
         let best = self.best_of_each(screening);
         let point = |result: &ScreeningResult| {
@@ -218,7 +219,10 @@ impl<'c> Searcher<'_, '_, 'c> {
         let mut of: Vec<(usize, usize)> = best.iter().filter_map(point).collect();
         for c in 0..self.candidates.len() {
             let sound = screening.iter().any(|h| h.candidate == c && h.failure.is_none());
-            if sound && !of.iter().any(|(known, _)| *known == c) {
+            if sound && !self.candidates[c].instants.is_empty() {
+                of.retain(|(known, _)| *known != c);
+                of.extend((0..self.candidates[c].points.len()).map(|point| (c, point)));
+            } else if sound && !of.iter().any(|(known, _)| *known == c) {
                 of.push((c, 0));
             }
         }

@@ -9,6 +9,8 @@ use crate::rows::{Rows, Usage};
 const MOST: usize = 2;
 /// Values in a window before or after a change at least.
 const SHORTEST: usize = 3;
+/// Jump, over what white noise makes of one, from which an instant is worth a run.
+const AUDIBLE: f64 = 4.0;
 /// Frequencies per cycle over the record.
 const OVERSAMPLING: f64 = 4.0;
 /// Frequencies at most.
@@ -58,31 +60,76 @@ fn power(rows: &Rows, whitened: &[f64], stretch: &std::ops::Range<usize>, omega:
 }
 
 /// The instants at which the residuals of the training rows change most, the largest change first: where the means of two windows,
-/// before and after, differ most for what white noise leaves in them. At the ends of a stretch there is room for shorter windows only.
+/// before and after, differ most for what white noise leaves in them. At the ends of a stretch there is room for shorter windows only. Behind them
+/// come those at which the residuals jump: a small jump is hidden where they also change smoothly.
 pub(crate) fn change_points(rows: &Rows, predicted: &[f64]) -> Vec<f64> {
     let scaled = rows.scaled(predicted);
-    let mut found: Vec<(f64, f64, f64)> = Vec::new();
+    let (mut changes, mut jumps): (Vec<Change>, Vec<Change>) = (Vec::new(), Vec::new());
     for stretch in training(rows) {
         let (times, values): (Vec<f64>, Vec<f64>) = stretch.map(|i| (rows.rows[i].time, scaled[i])).unzip();
         let n = values.len();
         let width = (n / 16).max(SHORTEST);
         for i in SHORTEST..(n + 1).saturating_sub(SHORTEST) {
             let (before, after) = (&values[i.saturating_sub(width)..i], &values[i..n.min(i + width)]);
-            let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
             let spread = (1.0 / before.len() as f64 + 1.0 / after.len() as f64).sqrt();
             let first = i.min(n.saturating_sub(width));
             let apart = times[n.min(first + width) - 1] - times[first];
-            found.push(((mean(after) - mean(before)).abs() / spread, times[i], apart));
+            changes.push(Change { size: (mean(after) - mean(before)).abs() / spread, at: times[i], apart });
         }
+        jumps.extend(jumps_of(&times, &values));
     }
-    found.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let mut instants: Vec<f64> = Vec::new();
-    for (_, time, apart) in found {
-        if instants.len() < MOST && !instants.iter().any(|known| (known - time).abs() <= apart) {
-            instants.push(time);
+    jumps.retain(|jump| jump.size > AUDIBLE);
+    let mut instants = largest(changes, &[]);
+    let further = largest(jumps, &instants);
+    instants.extend(further);
+    instants
+}
+
+/// A change of the residuals.
+struct Change {
+    /// Over the standard deviation that white noise gives it.
+    size: f64,
+    at: f64,
+    /// How far others are from it, of which it is one.
+    apart: f64,
+}
+
+/// The largest changes, none near another one nor at a known instant.
+fn largest(mut changes: Vec<Change>, known: &[f64]) -> Vec<f64> {
+    changes.sort_by(|a, b| b.size.total_cmp(&a.size));
+    let (mut instants, mut told): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
+    for Change { at, apart, .. } in changes {
+        if told.len() < MOST && !told.iter().any(|other| (other - at).abs() <= apart) {
+            told.push(at);
+            instants.extend((!known.contains(&at)).then_some(at));
         }
     }
     instants
+}
+
+/// How far values jump between two short windows on lines of one slope.
+fn jumps_of(times: &[f64], values: &[f64]) -> Vec<Change> {
+    let n = values.len();
+    let width = (n / 60).max(2 * SHORTEST);
+    let jump = |i: usize| {
+        let (before, after) = (i - width..i, i..i + width);
+        let [(t0, v0), (t1, v1)] =
+            [&before, &after].map(|w| (mean(&times[w.clone()]), mean(&values[w.clone()])));
+        let within = |w: &std::ops::Range<usize>, t: f64, v: f64| {
+            let of = w.clone().map(|k| (times[k] - t, values[k] - v));
+            of.fold((0.0, 0.0), |(xx, xy), (x, y)| (xx + x * x, xy + x * y))
+        };
+        let ((xx0, xy0), (xx1, xy1)) = (within(&before, t0, v0), within(&after, t1, v1));
+        let (xx, away) = (xx0 + xx1, t1 - t0);
+        let spread = (2.0 / width as f64 + away * away / xx).sqrt();
+        let size = (v1 - v0 - (xy0 + xy1) / xx * away).abs() / spread;
+        Change { size, at: times[i], apart: times[i + width - 1] - times[i] }
+    };
+    (width..(n + 1).saturating_sub(width)).map(jump).collect()
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
 }
 
 fn training(rows: &Rows) -> Vec<std::ops::Range<usize>> {
@@ -116,5 +163,16 @@ mod tests {
         assert!((change_points(&rows, &zero)[0] - 29.5).abs() < 1e-9);
         let (rows, zero) = sampled(|t| if t < 12.35 { 0.0 } else { 2.0 });
         assert!((change_points(&rows, &zero)[0] - 12.4).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_jump_is_found_under_a_change_that_is_larger_and_smooth() {
+        let smooth = |t: f64| 200.0 * (0.4 * t).sin();
+        let (rows, zero) = sampled(|t| smooth(t) + if t < 17.75 { 0.0 } else { 5.0 });
+        let found = change_points(&rows, &zero);
+        assert!((2..=4).contains(&found.len()), "{found:?}");
+        assert!(found.iter().any(|at| (at - 17.8).abs() < 1e-9), "{found:?}");
+        let (rows, zero) = sampled(smooth);
+        assert_eq!(change_points(&rows, &zero).len(), 2, "nothing jumps");
     }
 }

@@ -12,7 +12,7 @@ use crate::effect::Scale;
 use crate::{EffectDef, Quantity};
 
 /// Every effect of this family.
-pub(super) const GROWERS: &[Grow] = &[offset, drift, gain, lag, delay, saturation, quantisation];
+pub(super) const GROWERS: &[Grow] = &[offset, step, drift, gain, lag, delay, saturation, quantisation];
 
 /// Longest delay and lag, in sampling intervals: what is longer is seen in the data with the eye.
 pub(super) const LONGEST: f64 = 30.0;
@@ -49,8 +49,25 @@ fn offset(host: Host<'_>) -> Vec<EffectDef> {
         Draft::new(place, "sensor-offset", format!("The sensor of {} reads too much by a constant.", y.name))
             .adds(&place.output(y), b.clone())
             .coefficient(&b, &y.unit, ANY, "What is read too much.")
-            .confounders(&["bias-force", "sensor-drift", "sensor-gain"])
+            .confounders(&["bias-force", "sensor-step", "sensor-drift", "sensor-gain"])
             .source("Ljung 1999, System Identification, 2nd ed., ch. 14")
+    })
+}
+
+/// A constant error from some time on.
+fn step(host: Host<'_>) -> Vec<EffectDef> {
+    every(host, |place, y| {
+        let (b, when) = (place.name("sensor_step"), place.name("t_sensor_step"));
+        let says = format!(
+            "The sensor of {} reads too much by a constant from some time on, as after a knock.",
+            y.name
+        );
+        Draft::new(place, "sensor-step", says)
+            .adds(&place.output(y), format!("{b}*step(t - {when})"))
+            .coefficient(&b, &y.unit, ANY, "What is read too much from then on.")
+            .instant(&when, host.time)
+            .confounders(&["sensor-offset", "sensor-drift"])
+            .source("Basseville and Nikiforov 1993, Detection of Abrupt Changes, ch. 1")
     })
 }
 
@@ -62,7 +79,7 @@ fn drift(host: Host<'_>) -> Vec<EffectDef> {
             .adds(&place.output(y), format!("{rate}*(t - {start})"))
             .coefficient(&rate, per_time(&y.unit, host.time), ANY, "Drift per time.")
             .record_start(&start, host.time)
-            .confounders(&["sensor-offset", "input-drift"])
+            .confounders(&["sensor-offset", "sensor-step", "input-drift"])
             .source("Ljung 1999, System Identification, 2nd ed., ch. 14")
     })
 }
