@@ -22,12 +22,14 @@ pub fn noise_from_third_differences(series: &[f64]) -> f64 {
 
 /// The middle one of these values, or the mean of the two in the middle; NaN where there is none.
 pub(crate) fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut sorted: Vec<f64> = values.collect();
-    if sorted.is_empty() {
+    let mut values: Vec<f64> = values.collect();
+    let (n, middle) = (values.len(), values.len() / 2);
+    if n == 0 {
         return f64::NAN;
     }
-    sorted.sort_by(f64::total_cmp);
-    0.5 * (sorted[(sorted.len() - 1) / 2] + sorted[sorted.len() / 2])
+    let (below, upper, _) = values.select_nth_unstable_by(middle, f64::total_cmp);
+    let lower = if n % 2 == 1 { *upper } else { below.iter().copied().fold(f64::NEG_INFINITY, f64::max) };
+    0.5 * (lower + *upper)
 }
 
 /// Third differences that touch no NaN.

@@ -29,7 +29,7 @@ use crate::rounds::Rounds;
 use crate::run_cache::{Course, Point, RunCache};
 use crate::screen::candidates::candidates;
 use crate::screen::proposals::{self, Proposals};
-use crate::screen::residual_timing::{change_points, periods};
+use crate::screen::residual_timing::Timing;
 use crate::screen::resolve::{kinded, resolved_candidates};
 use crate::tell::words;
 
@@ -62,9 +62,8 @@ pub(super) fn diagnose<R>(
         rounds.begin(base.z());
         cache.stage("locate", "where simulation and data disagree");
         let tracks = cache.tracks(&Point { study, theta: base.theta() })?;
-        let (periods, change_points) =
-            (periods(&cache.rows, &base.predicted), change_points(&cache.rows, &base.predicted));
-        let candidates = resolved_candidates(study, &defs, &tracks, &periods, &change_points);
+        let timing = Timing::of(&cache.rows, &base.predicted);
+        let candidates = resolved_candidates(study, &defs, &tracks, &timing);
         foresee(cache, &candidates, options);
         let proposed = OnceCell::new();
         let mut found = search(cache, base, &candidates, &tracks, options)?;

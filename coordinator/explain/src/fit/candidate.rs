@@ -31,6 +31,8 @@ pub(crate) struct Candidate {
     /// The instants among its parameters, by position, and how far they are moved at least for a difference: what lies between two
     /// observations, or within a step of an integration, changes nothing.
     pub instants: Vec<(usize, f64)>,
+    /// Positions of the points with an instant at which the residuals of the model as it is jump.
+    pub jumps: Vec<usize>,
 }
 
 impl Candidate {
@@ -44,7 +46,7 @@ impl Candidate {
                 .flat_map(|point| values.iter().map(move |v| [point.as_slice(), &[*v]].concat()))
                 .collect();
         }
-        Self { def, points: thinned(points), kind: Kind::default(), instants: Vec::new() }
+        Self { def, points: thinned(points), kind: Kind::default(), instants: Vec::new(), jumps: Vec::new() }
     }
 
     /// The same of a kind.

@@ -208,8 +208,8 @@ impl<'c> Searcher<'_, '_, 'c> {
         Ok((self.refit(fits)?, to_settle))
     }
 
-    /// The best point of the grid of every candidate, by the first screening; of one that changes at an instant all of them, since what changes
-    /// beside another effect need not be where the gap as a whole does.
+    /// The best point of the grid of every candidate, by the first screening; and those at which the residuals jump, since beside another effect
+    /// that may be what is left.
     pub(super) fn best_points(&self, screening: &[ScreeningResult]) -> Vec<(usize, usize)> {
         let best = self.best_of_each(screening);
         let point = |result: &ScreeningResult| {
@@ -219,10 +219,10 @@ impl<'c> Searcher<'_, '_, 'c> {
         let mut of: Vec<(usize, usize)> = best.iter().filter_map(point).collect();
         for c in 0..self.candidates.len() {
             let sound = screening.iter().any(|h| h.candidate == c && h.failure.is_none());
-            if sound && !self.candidates[c].instants.is_empty() {
-                of.retain(|(known, _)| *known != c);
-                of.extend((0..self.candidates[c].points.len()).map(|point| (c, point)));
-            } else if sound && !of.iter().any(|(known, _)| *known == c) {
+            let jumps = self.candidates[c].jumps.iter().map(|jump| (c, *jump));
+            let jumps: Vec<(usize, usize)> = jumps.filter(|jump| sound && !of.contains(jump)).collect();
+            of.extend(jumps);
+            if sound && !of.iter().any(|(known, _)| *known == c) {
                 of.push((c, 0));
             }
         }

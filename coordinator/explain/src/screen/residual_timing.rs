@@ -16,6 +16,26 @@ const OVERSAMPLING: f64 = 4.0;
 /// Frequencies at most.
 const FREQUENCIES: usize = 600;
 
+/// What the residuals show of times.
+pub(crate) struct Timing {
+    /// Periods with the most power.
+    pub(crate) periods: Vec<f64>,
+    /// Instants at which they change most, and those of the jumps.
+    pub(crate) change_points: Vec<f64>,
+    /// Instants at which they jump.
+    pub(crate) jumps: Vec<f64>,
+}
+
+impl Timing {
+    /// That of the training rows with these predictions.
+    pub(crate) fn of(rows: &Rows, predicted: &[f64]) -> Self {
+        let (change_points, jumps) = (change_points(rows, predicted), jumps(rows, predicted));
+        let further = jumps.iter().filter(|at| !change_points.contains(at));
+        let change_points = change_points.iter().chain(further).copied().collect();
+        Self { periods: periods(rows, predicted), change_points, jumps }
+    }
+}
+
 /// The periods at which the residuals of the training rows have the most power, the strongest first: least-squares power at
 /// each frequency (Lomb 1976, without the shift in time), summed over channels and records.
 pub(crate) fn periods(rows: &Rows, predicted: &[f64]) -> Vec<f64> {
@@ -60,29 +80,37 @@ fn power(rows: &Rows, whitened: &[f64], stretch: &std::ops::Range<usize>, omega:
 }
 
 /// The instants at which the residuals of the training rows change most, the largest change first: where the means of two windows,
-/// before and after, differ most for what white noise leaves in them. At the ends of a stretch there is room for shorter windows only. Behind them
-/// come those at which the residuals jump: a small jump is hidden where they also change smoothly.
-pub(crate) fn change_points(rows: &Rows, predicted: &[f64]) -> Vec<f64> {
-    let scaled = rows.scaled(predicted);
-    let (mut changes, mut jumps): (Vec<Change>, Vec<Change>) = (Vec::new(), Vec::new());
-    for stretch in training(rows) {
-        let (times, values): (Vec<f64>, Vec<f64>) = stretch.map(|i| (rows.rows[i].time, scaled[i])).unzip();
+/// before and after, differ most for what white noise leaves in them. At the ends of a stretch there is room for shorter windows only.
+fn change_points(rows: &Rows, predicted: &[f64]) -> Vec<f64> {
+    largest(in_stretches(rows, predicted, |times, values| {
         let n = values.len();
         let width = (n / 16).max(SHORTEST);
-        for i in SHORTEST..(n + 1).saturating_sub(SHORTEST) {
+        let change = |i: usize| {
             let (before, after) = (&values[i.saturating_sub(width)..i], &values[i..n.min(i + width)]);
             let spread = (1.0 / before.len() as f64 + 1.0 / after.len() as f64).sqrt();
             let first = i.min(n.saturating_sub(width));
             let apart = times[n.min(first + width) - 1] - times[first];
-            changes.push(Change { size: (mean(after) - mean(before)).abs() / spread, at: times[i], apart });
-        }
-        jumps.extend(jumps_of(&times, &values));
-    }
+            Change { size: (mean(after) - mean(before)).abs() / spread, at: times[i], apart }
+        };
+        (SHORTEST..(n + 1).saturating_sub(SHORTEST)).map(change).collect()
+    }))
+}
+
+/// The instants at which they jump more than noise does: a small jump is hidden where they also change smoothly.
+fn jumps(rows: &Rows, predicted: &[f64]) -> Vec<f64> {
+    let mut jumps = in_stretches(rows, predicted, jumps_of);
     jumps.retain(|jump| jump.size > AUDIBLE);
-    let mut instants = largest(changes, &[]);
-    let further = largest(jumps, &instants);
-    instants.extend(further);
-    instants
+    largest(jumps)
+}
+
+/// The changes in each stretch of training rows, by its times and residuals in units of the noise.
+fn in_stretches(rows: &Rows, predicted: &[f64], of: impl Fn(&[f64], &[f64]) -> Vec<Change>) -> Vec<Change> {
+    let scaled = rows.scaled(predicted);
+    let within = |stretch: std::ops::Range<usize>| {
+        let (times, values): (Vec<f64>, Vec<f64>) = stretch.map(|i| (rows.rows[i].time, scaled[i])).unzip();
+        of(&times, &values)
+    };
+    training(rows).into_iter().flat_map(within).collect()
 }
 
 /// A change of the residuals.
@@ -94,14 +122,13 @@ struct Change {
     apart: f64,
 }
 
-/// The largest changes, none near another one nor at a known instant.
-fn largest(mut changes: Vec<Change>, known: &[f64]) -> Vec<f64> {
+/// The largest changes, none near another one.
+fn largest(mut changes: Vec<Change>) -> Vec<f64> {
     changes.sort_by(|a, b| b.size.total_cmp(&a.size));
-    let (mut instants, mut told): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
+    let mut instants: Vec<f64> = Vec::new();
     for Change { at, apart, .. } in changes {
-        if told.len() < MOST && !told.iter().any(|other| (other - at).abs() <= apart) {
-            told.push(at);
-            instants.extend((!known.contains(&at)).then_some(at));
+        if instants.len() < MOST && !instants.iter().any(|other| (other - at).abs() <= apart) {
+            instants.push(at);
         }
     }
     instants
@@ -169,10 +196,14 @@ mod tests {
     fn a_jump_is_found_under_a_change_that_is_larger_and_smooth() {
         let smooth = |t: f64| 200.0 * (0.4 * t).sin();
         let (rows, zero) = sampled(|t| smooth(t) + if t < 17.75 { 0.0 } else { 5.0 });
-        let found = change_points(&rows, &zero);
-        assert!((2..=4).contains(&found.len()), "{found:?}");
-        assert!(found.iter().any(|at| (at - 17.8).abs() < 1e-9), "{found:?}");
+        let Timing { change_points, jumps, .. } = Timing::of(&rows, &zero);
+        assert!((3..=4).contains(&change_points.len()), "{change_points:?}");
+        assert!(
+            jumps.iter().any(|at| (at - 17.8).abs() < 1e-9) && change_points.ends_with(&jumps),
+            "{jumps:?}"
+        );
         let (rows, zero) = sampled(smooth);
-        assert_eq!(change_points(&rows, &zero).len(), 2, "nothing jumps");
+        let Timing { change_points, jumps, .. } = Timing::of(&rows, &zero);
+        assert_eq!((change_points.len(), jumps.len()), (2, 0), "nothing jumps");
     }
 }

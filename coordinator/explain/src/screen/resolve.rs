@@ -8,6 +8,7 @@ use starlings_models::equations::Expression;
 use starlings_study::{Record, Study};
 
 use super::candidates::kind_of;
+use super::residual_timing::Timing;
 use crate::fit::candidate::Candidate;
 use crate::locate::Track;
 
@@ -16,15 +17,18 @@ pub(crate) fn resolved_candidates(
     study: &Study,
     defs: &[EffectDef],
     tracks: &[Track],
-    periods: &[f64],
-    change_points: &[f64],
+    timing: &Timing,
 ) -> Vec<Candidate> {
-    let mut candidates = kinded(study, resolved(study, defs, tracks, periods, change_points));
+    let mut candidates = kinded(study, resolved(study, defs, tracks, timing));
     for candidate in &mut candidates {
         let Some(def) = defs.iter().find(|def| def.name == candidate.def.name) else { continue };
         let instants = instants(def);
         let places = candidate.def.parameters.iter().enumerate().filter(|(_, p)| instants.contains(&p.name));
         candidate.instants = places.map(|(k, _)| (k, sampling(study))).collect();
+        let is_jump = |point: &Vec<f64>| {
+            candidate.instants.iter().any(|(k, _)| *k > 0 && timing.jumps.contains(&point[k - 1]))
+        };
+        candidate.jumps = (0..candidate.points.len()).filter(|p| is_jump(&candidate.points[*p])).collect();
     }
     candidates
 }
@@ -59,13 +63,7 @@ fn instants(def: &EffectDef) -> Vec<String> {
 /// The effects with their numbers in the model's units. An effect whose quantity is constant along the run is left out, since its
 /// numbers count in the course of that quantity. A duration inside a term is screened at the dominant periods of the residuals,
 /// an instant at their change points as well ([`super::residual_timing`]).
-fn resolved(
-    study: &Study,
-    defs: &[EffectDef],
-    tracks: &[Track],
-    periods: &[f64],
-    change_points: &[f64],
-) -> Vec<EffectDef> {
+fn resolved(study: &Study, defs: &[EffectDef], tracks: &[Track], timing: &Timing) -> Vec<EffectDef> {
     let course = |name: &str| tracks.iter().find(|t| t.name == name).map(Track::ends);
     let times = || study.records.iter().filter(|r| r.is_trained()).filter_map(Record::train_span);
     let from = times().map(|s| s[0]).fold(f64::INFINITY, f64::min);
@@ -80,8 +78,12 @@ fn resolved(
             let within =
                 |values: &[f64]| values.iter().copied().filter(|v| lo < *v && *v < hi).collect::<Vec<_>>();
             match wanted.scale {
-                Scale::Duration if !within(periods).is_empty() => parameter.grid = within(periods),
-                _ if instants(def).contains(&wanted.name) => parameter.grid.extend(within(change_points)),
+                Scale::Duration if !within(&timing.periods).is_empty() => {
+                    parameter.grid = within(&timing.periods);
+                }
+                _ if instants(def).contains(&wanted.name) => {
+                    parameter.grid.extend(within(&timing.change_points));
+                }
                 _ => {}
             }
         }

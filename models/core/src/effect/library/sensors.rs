@@ -57,7 +57,7 @@ fn offset(host: Host<'_>) -> Vec<EffectDef> {
 /// A constant error from some time on.
 fn step(host: Host<'_>) -> Vec<EffectDef> {
     every(host, |place, y| {
-        let (b, when) = (place.name("sensor_step"), place.name("t_sensor_step"));
+        let (b, when) = (place.name("sensor_jump"), place.name("t_sensor_jump"));
         let says = format!(
             "The sensor of {} reads too much by a constant from some time on, as after a knock.",
             y.name
