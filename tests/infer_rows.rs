@@ -94,6 +94,23 @@ fn a_value_that_stands_apart_is_told_with_its_line_and_an_inference_without_it_i
     assert_eq!(found["warnings"], Value::Array(Vec::new()), "{found}");
 }
 
+/// Rows are looked through in pieces: where one ends and the next begins nothing is missed, and nothing told twice.
+#[test]
+fn values_that_stand_apart_are_told_once_wherever_a_long_recording_is_cut() {
+    let mut rows = coupled(5, 70_000, 0.0);
+    let at = [2, 65_503, 65_504, 65_535, 69_998];
+    for row in at {
+        rows[row][row % 2] += 3.0;
+    }
+    let found = of(&rows, "");
+    let told = said(&found, APART);
+    assert_eq!(told.len(), 1, "{found}");
+    for row in &at[..4] {
+        assert_eq!(told[0].matches(&format!("in line {} of", row + 2)).count(), 1, "row {row}: {told:?}");
+    }
+    assert!(told[0].contains(", 1 more;"), "{told:?}");
+}
+
 /// Noise of one size, and noise that grows with the state over decades.
 #[test]
 fn no_value_of_a_clean_recording_stands_apart() {

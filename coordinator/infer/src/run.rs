@@ -68,9 +68,14 @@ pub fn infer(
     let cut = cut(choice, &asked, at);
     asked.share_pairs(&choice.records, cut);
     let mut teller = Teller::new(choice, cut, at, watch);
-    let (gathered, convergence) = gathered(&asked, &choice.records, cut, fleet, (reader, &mut teller))?;
+    // The recordings are looked through while the fleet sums them.
+    let (summed, strays) = std::thread::scope(|scope| {
+        let looking = scope.spawn(|| strays(&asked, at, &study.time_unit));
+        let summed = gathered(&asked, &choice.records, cut, fleet, (reader, &mut teller));
+        (summed, looking.join().ok().flatten())
+    });
+    let (gathered, convergence) = summed?;
     let structure = &asked.question.structure;
-    let strays = strays(&asked, at, &study.time_unit);
     let answer = match choice.measured {
         MeasuredChoice::Known(sd) => Answer::smoothed(&asked, cut, sd, &gathered.levels, &mut teller),
         _ => Answer::of(choice, &asked.fit, structure, (&asked.question.basis, &gathered)),

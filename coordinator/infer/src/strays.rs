@@ -1,8 +1,8 @@
 //! Single values of a state that stand apart from the rows around them, as a sensor's spikes do: they are told, not left out.
 //!
 //! One such value in ten thousand rows is taken for errors of the measurement, coarse steps or a change of the coefficients, by which these are
-//! off by many of their standard deviations. What stands apart is the estimators' (`estimators/src/outliers.rs`), which asks how a record
-//! scatters as a whole; noise may be larger in some states than in others, so that a value has to stand apart from the rows near it
+//! off by many of their standard deviations. What stands apart is the estimators' (`estimators/src/outliers.rs`), which asks how many
+//! rows scatter together; noise may be larger in some states than in others, so that a value has to stand apart from the rows near it
 //! alone, too. Next file to read: `doubts.rs`, for what is doubtful of a recording as a whole.
 
 use starlings_estimators::outliers;
@@ -13,18 +13,22 @@ use crate::blocks::{Start, length, open};
 use crate::error::InferError;
 use crate::run::Asked;
 
-/// Rows of all records together up to which they are looked through: columns are held in memory, and the files are read once more.
+/// Rows of all records together up to which they are looked through, since the files are read once more.
 const MOST: f64 = 2e6;
+/// Rows that are held at once.
+const HELD: usize = 1 << 16;
 /// Rows on either side of a value that it has to stand apart from.
 const AROUND: usize = 32;
 /// Values that are named at most.
 const NAMED: usize = 4;
 
-/// The states of a record, column by column.
+/// Rows of a record, its states column by column.
 struct Columns {
     times: Vec<f64>,
     lines: Vec<u64>,
     values: Vec<Vec<f64>>,
+    /// The first of them that was not judged yet.
+    next: usize,
 }
 
 /// What is said of values that stand apart; `None` where there is none, or nobody looked.
@@ -37,8 +41,7 @@ pub(crate) fn strays(asked: &Asked<'_>, at: Start, unit: &str) -> Option<String>
             break;
         }
         // What is wrong with a file is told where it is summed.
-        let Ok(columns) = read(record, asked.question.basis.n_state()) else { continue };
-        found.extend(said(record, &columns, asked.question.structure.equations(), choice, unit));
+        found.extend(of_record(record, asked, unit).unwrap_or_default());
     }
     words(&found, choice)
 }
@@ -51,10 +54,13 @@ pub(crate) fn beside(error: InferError, strays: Option<&String>) -> InferError {
     }
 }
 
-fn read(record: &InferRecord, n_state: usize) -> Result<Columns, InferError> {
-    let mut rows = open(record)?;
+/// The values of a record that stand apart, each in words, in the order of the file.
+fn of_record(record: &InferRecord, asked: &Asked<'_>, unit: &str) -> Result<Vec<String>, InferError> {
+    let (mut rows, n_state) = (open(record)?, asked.question.basis.n_state());
     let mut of_row = vec![0.0; record.columns.len()];
-    let mut columns = Columns { times: Vec::new(), lines: Vec::new(), values: vec![Vec::new(); n_state] };
+    let values = vec![Vec::new(); n_state];
+    let mut columns = Columns { times: Vec::new(), lines: Vec::new(), values, next: 0 };
+    let mut found = Vec::new();
     while let Some(row) = rows.next(&mut of_row)? {
         if row.time < record.span[0] || row.time > record.span[1] {
             continue;
@@ -64,38 +70,49 @@ fn read(record: &InferRecord, n_state: usize) -> Result<Columns, InferError> {
         for (column, value) in columns.values.iter_mut().zip(&of_row) {
             column.push(*value);
         }
-    }
-    Ok(columns)
-}
-
-/// The values of a record that stand apart, each in words, in the order of the file.
-fn said(
-    record: &InferRecord,
-    columns: &Columns,
-    names: &[String],
-    choice: &InferChoice,
-    unit: &str,
-) -> Vec<String> {
-    let Columns { times, lines, values } = columns;
-    let mut found = Vec::new();
-    for (name, of_state) in names.iter().zip(values) {
-        for (at, distance, by) in apart(times, of_state, choice) {
-            let text = format!(
-                "{name} in line {} of record `{}` (at {} {unit}, {} from the line between its neighbours, {} times how others scatter)",
-                lines[at],
-                record.name,
-                rounded(times[at], 9),
-                rounded(distance, 2),
-                rounded(by, 2),
-            );
-            found.push((at, text));
+        if columns.times.len() == HELD {
+            found.extend(columns.said(HELD - AROUND, record, asked, unit));
+            columns.forget();
         }
     }
-    found.sort_by_key(|(at, _)| *at);
-    found.into_iter().map(|(_, text)| text).collect()
+    found.extend(columns.said(columns.times.len(), record, asked, unit));
+    Ok(found)
 }
 
-/// Rows whose value stands apart in the whole series and among the rows near it, with how far and how many times as far as these scatter.
+impl Columns {
+    /// The values that stand apart, of rows up to `to` that were not judged yet, each in words.
+    fn said(&mut self, to: usize, record: &InferRecord, asked: &Asked<'_>, unit: &str) -> Vec<String> {
+        let mut found = Vec::new();
+        for (name, of_state) in asked.question.structure.equations().iter().zip(&self.values) {
+            let all = apart(&self.times, of_state, asked.choice).into_iter();
+            for (at, distance, by) in all.filter(|(at, ..)| (self.next..to).contains(at)) {
+                let text = format!(
+                    "{name} in line {} of record `{}` (at {} {unit}, {} from the line between its neighbours, {} times how others scatter)",
+                    self.lines[at],
+                    record.name,
+                    rounded(self.times[at], 9),
+                    rounded(distance, 2),
+                    rounded(by, 2),
+                );
+                found.push((at, text));
+            }
+        }
+        self.next = to;
+        found.sort_by_key(|(at, _)| *at);
+        found.into_iter().map(|(_, text)| text).collect()
+    }
+
+    /// Keeps the rows that were not judged yet, and those that they are judged by.
+    fn forget(&mut self) {
+        let n = self.next.saturating_sub(AROUND);
+        self.times.drain(..n);
+        self.lines.drain(..n);
+        self.values.iter_mut().for_each(|column| drop(column.drain(..n)));
+        self.next -= n;
+    }
+}
+
+/// Rows whose value stands apart among all that are held and among the rows near it, with how far and how many times as far as these scatter.
 fn apart(times: &[f64], values: &[f64], choice: &InferChoice) -> Vec<(usize, f64, f64)> {
     let noise = if let MeasuredChoice::Known(sd) = choice.measured { Some(sd) } else { None };
     let near = |at: usize| {
