@@ -5,7 +5,7 @@
 use nalgebra::{DMatrix, DVector};
 use starlings_estimators::inference::{
     Basis, Diffusion, Estimate, Extrapolated, Fit, InferenceError, NoiseCheck, NoiseForm, Posterior, Prior,
-    Strength, Structure, Sums, Verdict, extrapolate,
+    Strength, Structure, Sums, Verdict, extrapolate, noise_checks,
 };
 use starlings_study::infer_choice::{DiffusionChoice, InferChoice, MeasuredChoice};
 
@@ -120,7 +120,7 @@ impl Answer {
         teller: &mut Teller<'_>,
     ) -> Result<Self, InferError> {
         let Asked { choice, question, fit, .. } = asked;
-        let checks = match levels
+        let mut checks = match levels
             .first()
             .map(|sums| Fitted::of(choice, fit, &question.structure, sums, Given::Earlier(None)))
         {
@@ -131,9 +131,14 @@ impl Answer {
             }
             Some(Err(error)) => return Err(error.into()),
         };
-        let found = smoothed(question, fit, &choice.records, cut, sd, teller)?;
+        let found = smoothed(question, fit, &choice.records, cut, sd, teller)
+            .map_err(|error| hidden::lost(error, sd, levels.first(), &question.structure))?;
         let doubts = not_converged(found.converged, found.log_likelihood.len()).into_iter().collect();
         let posterior = found.posterior;
+        if let Some(sums) = levels.first().filter(|_| !checks.is_empty()) {
+            // Coefficients of the recording as it was measured are biased by the errors, and residuals of those show too few of them.
+            checks = noise_checks(sums, &question.structure, &posterior)?;
+        }
         let fit = fit.clone();
         Ok(Self { posterior, checks, fit, departs: Vec::new(), extrapolated: None, doubts, constant: None })
     }

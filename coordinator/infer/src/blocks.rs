@@ -10,7 +10,7 @@ use starlings_estimators::inference::STEP_TOLERANCE;
 use starlings_study::infer_choice::InferRecord;
 
 use crate::error::InferError;
-use crate::even_step::{even_step, rounded};
+use crate::even_step::{even_step, uneven};
 use crate::parts::Parts;
 use crate::resampled::Feed;
 use crate::rows::{Row, Rows};
@@ -243,27 +243,28 @@ impl<'a, R: Read> Blocks<'a, R> {
         Err(self.uneven(line, before, time))
     }
 
-    fn uneven(&self, line: u64, before: f64, time: f64) -> InferError {
+    /// The first of the next rows whose time is not later than that of the row before it, with both times and its line.
+    fn back(&mut self, mut before: f64) -> Option<(u64, f64, f64)> {
+        for _ in 0..FIRST {
+            let Row { line, time, .. } = self.rows.next(&mut self.next).ok()??;
+            if time <= before {
+                return Some((line, before, time));
+            }
+            before = time;
+        }
+        None
+    }
+
+    fn uneven(&mut self, line: u64, before: f64, time: f64) -> InferError {
         let step = self.cut.step;
-        let (message, help) = if time <= before {
-            (
-                format!("time {time} is not later than {before} in the row before"),
-                "keep one row per time, in their order",
-            )
-        } else if time - before > 1.5 * step {
-            (
-                format!("time jumps from {before} to {time}, over more than one step of {step}"),
-                "use gaps = \"break\" in [infer] to go on behind it without a step across",
-            )
-        } else {
-            (
-                format!(
-                    "the step from {before} to {time} is {} where the recording's is {step}",
-                    rounded(time - before, &[before, time], 1)
-                ),
-                "an inference needs equal steps: `resample = STEP` in [infer] interpolates to them",
-            )
-        };
+        if time - before > 1.5 * step
+            && let Some((line, later, earlier)) = self.back(time)
+        {
+            let message =
+                format!("time goes back from {later} to {earlier}: rows are not in the order of their times");
+            return self.rows.fault(Some(line), message, "sort the rows by time, one per time");
+        }
+        let (message, help) = uneven(step, before, time);
         self.rows.fault(Some(line), message, help)
     }
 

@@ -36,6 +36,27 @@ pub enum InferError {
         /// The states with the figures.
         says: String,
     },
+    /// No path follows the recording under the errors of the measurement that the study gives.
+    #[error(
+        "no path of these states follows the recording under errors of the measurement of standard deviation {sd}, measurement_noise: {says} \
+         ({help})"
+    )]
+    Lost {
+        /// What the study gives.
+        sd: f64,
+        /// What the recording shows.
+        says: String,
+        /// What to do.
+        help: &'static str,
+    },
+    /// There is no estimate, and values stand apart which may be why.
+    #[error("{error}\n  {strays}")]
+    Strays {
+        /// Why there is none.
+        error: Box<InferError>,
+        /// What is said of the values.
+        strays: String,
+    },
     /// A recording is not what it should be.
     #[error("{}{}: {message} ({help})", file.display(), line.map(|line| format!(":{line}")).unwrap_or_default())]
     Recording {

@@ -39,6 +39,29 @@ fn last_digit(value: f64) -> f64 {
     10.0_f64.powf(-(places as f64))
 }
 
+/// What is said of a row that does not follow the one before it by one step, and what to do.
+pub(crate) fn uneven(step: f64, before: f64, time: f64) -> (String, &'static str) {
+    if time <= before {
+        (
+            format!("time {time} is not later than {before} in the row before"),
+            "keep one row per time, in their order",
+        )
+    } else if time - before > 1.5 * step {
+        (
+            format!("time jumps from {before} to {time}, over more than one step of {step}"),
+            "use gaps = \"break\" in [infer] to go on behind it without a step across",
+        )
+    } else {
+        (
+            format!(
+                "the step from {before} to {time} is {} where the recording's is {step}",
+                rounded(time - before, &[before, time], 1)
+            ),
+            "an inference needs equal steps: `resample = STEP` in [infer] interpolates to them",
+        )
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::even_step;

@@ -45,16 +45,11 @@ impl Fitted {
             Given::Earlier(Some(earlier)) => fit.update(sums, structure, earlier)?,
             _ => fit.posterior(sums, structure)?,
         };
-        let mut checks =
-            if sums.n_pair() > 0 { noise_checks(sums, structure, &posterior)? } else { Vec::new() };
-        if let Given::Recording(basis, pairs) = given
-            && checks.iter().any(|check| check.is_sure() || check.verdict == Verdict::Matters)
-        {
-            checks = if_any(checks, basis, pairs, &posterior, sums.step())?;
-        }
+        let mut checks = checked(sums, structure, &posterior, given)?;
         let matters = checks.iter().any(|check| check.verdict == Verdict::Matters);
         let is_auto = choice.measured == MeasuredChoice::Auto;
         // What interpolation takes out of single steps, neighbouring ones have together.
+        let first = posterior.drift().clone();
         let mut fit = Fit { lag_corrected: (matters && is_auto) || choice.resample, ..fit.clone() };
         let freed = Fit { lag_corrected: true, ..fit.clone() };
         if fit.lag_corrected {
@@ -72,7 +67,33 @@ impl Fitted {
             posterior = fit.posterior(sums, structure)?;
             departs = noise_form(&fit.diffusion, sums, structure, &posterior, FALSE_ALARM)?;
         }
+        if posterior.drift() != &first {
+            // Errors of the measurement bias the coefficients that leave them in the noise, and residuals of those show too few of them.
+            checks = checked(sums, structure, &posterior, given)?;
+        }
         Ok(Self { posterior, checks, departs, fit })
+    }
+}
+
+/// What residuals of a posterior show at lag one, where there are neighbouring steps; with the sampling errors of noise that is not
+/// constant where pairs of steps say that it is not.
+fn checked(
+    sums: &Sums,
+    structure: &Structure,
+    posterior: &Posterior,
+    given: Given<'_>,
+) -> Result<Vec<NoiseCheck>, InferenceError> {
+    if sums.n_pair() == 0 {
+        return Ok(Vec::new());
+    }
+    let checks = noise_checks(sums, structure, posterior)?;
+    match given {
+        Given::Recording(basis, pairs)
+            if checks.iter().any(|check| check.is_sure() || check.verdict == Verdict::Matters) =>
+        {
+            if_any(checks, basis, pairs, posterior, sums.step())
+        }
+        _ => Ok(checks),
     }
 }
 

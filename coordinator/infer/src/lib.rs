@@ -10,6 +10,7 @@
 //! | `smoothed` | the same from a smoothed path, where the measurement's noise is known |
 //! | `hidden`, `coarse` | whether errors of the measurement, or the recording's steps, are in the way |
 //! | `doubts`, `varying`, `constancy` | what else is doubtful of a recording: noise that is not constant, coefficients that change |
+//! | `strays` | single values that stand apart from the rows around them |
 //! | `missing` | which terms the drift lacks, among candidates |
 //! | [`explained`](mod@explained) | what was found of missing terms as an explanation |
 //! | [`reduced`] | a model with fewer unknowns than coefficients |
@@ -49,6 +50,7 @@ mod rows;
 pub mod run;
 mod share;
 mod smoothed;
+mod strays;
 mod varying;
 mod words;
 

@@ -20,6 +20,7 @@ use crate::missing::Wider;
 use crate::progress::{Progress, Teller};
 use crate::reduced::{check_reduced, fit_reduced};
 use crate::result::{Converging, Inference, MissingFound, RecordUsed};
+use crate::strays::{beside, strays};
 use crate::words;
 
 /// Blocks that a recording is cut into where the study does not say, as far as their sizes allow.
@@ -67,17 +68,24 @@ pub fn infer(
     let cut = cut(choice, &asked, at);
     asked.share_pairs(&choice.records, cut);
     let mut teller = Teller::new(choice, cut, at, watch);
-    let (gathered, convergence) = gathered(&asked, &choice.records, cut, fleet, (reader, &mut teller))?;
+    // The recordings are looked through while the fleet sums them.
+    let (summed, strays) = std::thread::scope(|scope| {
+        let looking = scope.spawn(|| strays(&asked, at, &study.time_unit));
+        let summed = gathered(&asked, &choice.records, cut, fleet, (reader, &mut teller));
+        (summed, looking.join().ok().flatten())
+    });
+    let (gathered, convergence) = summed?;
     let structure = &asked.question.structure;
-    let mut answer = match choice.measured {
-        MeasuredChoice::Known(sd) => Answer::smoothed(&asked, cut, sd, &gathered.levels, &mut teller)?,
-        _ => Answer::of(choice, &asked.fit, structure, (&asked.question.basis, &gathered))?,
+    let answer = match choice.measured {
+        MeasuredChoice::Known(sd) => Answer::smoothed(&asked, cut, sd, &gathered.levels, &mut teller),
+        _ => Answer::of(choice, &asked.fit, structure, (&asked.question.basis, &gathered)),
     };
+    let mut answer = answer.map_err(|error| beside(error, strays.as_ref()))?;
     let missing = missing(&asked, &answer.fit, &gathered, cut, fleet, (reader, &mut teller))?;
     teller.posterior();
     let convergence = convergence.finish(&answer.fit, structure, &gathered);
     let doubts = Doubts::of(&asked, &mut answer, &gathered, (cut, at));
-    let beside = Beside { convergence, missing, doubts };
+    let beside = Beside { strays, convergence, missing, doubts };
     told_of(study, &asked, &gathered, &answer, cut, beside)
 }
 
@@ -221,6 +229,7 @@ fn cut(choice: &InferChoice, asked: &Asked<'_>, at: Start) -> Cut {
 
 /// What is told beside the answer.
 struct Beside {
+    strays: Option<String>,
     convergence: Vec<Converging>,
     missing: Option<MissingFound>,
     doubts: Doubts,
@@ -236,7 +245,7 @@ fn told_of(
     beside: Beside,
 ) -> Result<Inference, InferError> {
     let choice = asked.choice;
-    let Beside { convergence, missing, doubts } = beside;
+    let Beside { strays, convergence, missing, doubts } = beside;
     let structure = &asked.question.structure;
     let means = answer.means();
     let reduced =
@@ -245,7 +254,8 @@ fn told_of(
     let coefficients = answer.coefficients(choice);
     let n_step = gathered.levels.first().map_or(0, Sums::n_step);
     let records = choice.records.iter().enumerate();
-    let mut warnings = words::warnings(choice, answer, reduced.as_ref(), missing.as_ref());
+    let mut warnings: Vec<String> = strays.into_iter().collect();
+    warnings.extend(words::warnings(choice, answer, reduced.as_ref(), missing.as_ref()));
     warnings.extend(doubts.said(choice, answer, cut, &study.time_unit));
     Ok(Inference {
         study: study.name.clone(),

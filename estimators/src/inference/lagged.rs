@@ -17,6 +17,12 @@ pub(crate) fn share(at_zero: f64, at_one: f64) -> f64 {
     noise * noise / spread
 }
 
+/// N times the variance of γ₀ + γ₁ + γ₋₁ of two equations that share nothing, with the mean products of each at lag zero and one: the sum of
+/// γᵢ(k) γⱼ(k + m) over all k, three times for m = 0, twice for m = ±1 and once for m = ±2 (Bartlett 1946).
+pub(crate) fn spread([zero_i, zero_j]: [f64; 2], [one_i, one_j]: [f64; 2]) -> f64 {
+    3.0 * zero_i * zero_j + 4.0 * (zero_i * one_j + one_i * zero_j) + 8.0 * one_i * one_j
+}
+
 /// The shares of all equations, from sums of products of N residuals at lag zero and of P pairs at lag one, L x L each.
 pub(crate) fn shares(
     diffusion: &Diffusion,
@@ -65,6 +71,15 @@ mod tests {
         assert!((share(2.0, 0.0) - 1.0 / 3.0).abs() < 1e-15);
         // Twice as much error of the measurement as noise: γ₀ = 1 + 2·2, γ₁ = −2; 1 over 75 − 80 + 32.
         assert!((share(5.0, -2.0) - 1.0 / 27.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn two_alike_equations_have_half_the_spread_of_one() {
+        // One by itself has 6γ₀² + 16γ₀γ₁ + 16γ₁², which is (γ₀ + 2γ₁)² of two over its share.
+        let (zero, one) = (5.0, -2.0);
+        let by_itself = 2.0 * (zero + 2.0 * one) * (zero + 2.0 * one) / share(zero, one);
+        assert!((2.0 * spread([zero; 2], [one; 2]) - by_itself).abs() < 1e-12);
+        assert!((spread([2.0, 3.0], [0.0; 2]) - 18.0).abs() < 1e-15, "white residuals");
     }
 
     #[test]

@@ -86,3 +86,42 @@ fn the_whole_noise_in_the_jacobian_frees_a_form_of_its_bias() {
         }
     }
 }
+
+/// Errors of the measurement leave next to nothing of D: no correlation is told from that, and none above 1, where there is none.
+#[test]
+fn noise_behind_large_errors_is_called_shared_as_rarely_as_stated() {
+    for (form, n) in [(Diffusion::Diagonal, 500), (Diffusion::Diagonal, 4_000), (Diffusion::Isotropic, 4_000)]
+    {
+        let (mut told, mut fitted) = (0, 0);
+        for seed in 0..200 {
+            let mut draw = rng(1_000 + seed);
+            let mut rows = spiral(seed, n, 0.5, 0.0);
+            rows.iter_mut().flatten().for_each(|v| *v += 0.2 * gauss(&mut draw));
+            let (sums, structure) = question(&rows);
+            let fit = Fit { lag_corrected: true, ..Fit::new(form.clone(), 4) };
+            let Ok(posterior) = fit.posterior(&sums, &structure) else { continue };
+            fitted += 1;
+            let found = noise_form(&form, &sums, &structure, &posterior, 0.05).unwrap();
+            told += usize::from(!found.is_empty());
+            for departs in found {
+                let NoiseForm::Shared(_, correlation) = departs else { continue };
+                assert!(correlation.abs() <= 1.0, "{correlation}");
+            }
+        }
+        println!("{form:?}, {n} rows: {told} of {fitted} that have a fit, where one in twenty is stated");
+        assert!(fitted >= 50 && told * 10 <= fitted, "{form:?}, {n}: {told} of {fitted}");
+    }
+}
+
+#[test]
+fn shared_noise_is_told_behind_errors_too() {
+    let mut draw = rng(2);
+    let mut rows = spiral(1, 20_000, 0.5, 0.8);
+    rows.iter_mut().flatten().for_each(|v| *v += 0.1 * gauss(&mut draw));
+    let (sums, structure) = question(&rows);
+    let fit = Fit { lag_corrected: true, ..Fit::new(Diffusion::Diagonal, 4) };
+    let posterior = fit.posterior(&sums, &structure).unwrap();
+    let found = noise_form(&fit.diffusion, &sums, &structure, &posterior, 1e-3).unwrap();
+    let [NoiseForm::Shared(_, correlation)] = found.as_slice() else { panic!("{found:?}") };
+    assert!((0.6..=1.0).contains(correlation), "{correlation}");
+}
