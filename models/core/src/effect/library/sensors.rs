@@ -65,7 +65,7 @@ fn step(host: Host<'_>) -> Vec<EffectDef> {
         Draft::new(place, "sensor-step", says)
             .adds(&place.output(y), format!("{b}*step(t - {when})"))
             .coefficient(&b, &y.unit, ANY, "What is read too much from then on.")
-            .instant(&when, host.time)
+            .jump(&when, host.time)
             .confounders(&["sensor-offset", "sensor-drift"])
             .source("Basseville and Nikiforov 1993, Detection of Abrupt Changes, ch. 1")
     })
