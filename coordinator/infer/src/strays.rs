@@ -19,6 +19,8 @@ const MOST: f64 = 2e6;
 const HELD: usize = 1 << 16;
 /// Rows on either side of a value that it has to stand apart from.
 const AROUND: usize = 32;
+/// Of the values that are held one in so many may stand apart: where more do, the state has pulses, or its noise heavy tails.
+const ONE_IN: usize = 50;
 /// Values that are named at most.
 const NAMED: usize = 4;
 
@@ -121,6 +123,9 @@ fn apart(times: &[f64], values: &[f64], choice: &InferChoice) -> Vec<(usize, f64
         found.into_iter().find(|near| near.at + from == at)
     };
     let all = outliers(times, values, noise).into_iter();
+    if all.len() > (values.len() / ONE_IN).max(1) {
+        return Vec::new();
+    }
     all.filter_map(|stray| near(stray.at).map(|near| (stray.at, near.distance, near.times.min(stray.times))))
         .collect()
 }

@@ -44,7 +44,7 @@ use self::settings::{estimator, fleet};
 use self::solver::DescribedSolver;
 pub(crate) use self::solver::UNTRIED;
 use super::checked::{
-    EstimatorChoice, ExplainChoice, FleetChoice, PredictChoice, Record, SpectrumChoice, Study,
+    EstimatorChoice, ExplainChoice, FleetChoice, PredictChoice, Record, Rounding, SpectrumChoice, Study,
 };
 use super::expand;
 use super::file::StudyFile;
@@ -164,6 +164,7 @@ fn study_of(
         delays: false,
         runs_here: true,
         whole_answers: false,
+        rounding: Rounding { is_spread_given: file.estimator.spread.is_some(), ..Rounding::default() },
         solver_host: solver_host.clone(),
         warnings: Vec::new(),
         candidate_warnings: Vec::new(),

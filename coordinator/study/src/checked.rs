@@ -61,6 +61,8 @@ pub struct Study {
     pub runs_here: bool,
     /// Whether every run covers a whole record, since the solver answers for nothing less; found by a dry run.
     pub whole_answers: bool,
+    /// What the rounding of the solver's outputs is worth; the trial finds it.
+    pub rounding: Rounding,
     /// Starts its solver, where the model is one.
     pub solver_host: SolverHost,
     /// What is doubtful in what takes part in every run, but no error.
@@ -105,6 +107,18 @@ pub struct ThetaEntry {
     pub transform: Transform,
     /// How it moves from one analysis to the next.
     pub drift: Drift,
+}
+
+/// How coarse the outputs of a solver are beside the noise.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default)]
+pub struct Rounding {
+    /// Sum of the variances of rounding over those of the noise, over the fitted values, per sigma point; zero where nothing is rounded.
+    pub variances: f64,
+    /// Whether the study says how far apart sigma points are.
+    pub is_spread_given: bool,
+    /// Width of the points of a fit in the place of [`EstimatorChoice::spread`]; `None` where that is wide enough, or given.
+    pub spread: Option<f64>,
 }
 
 /// A recording.
@@ -168,8 +182,6 @@ pub struct EstimatorChoice {
     pub anneal: f64,
     /// Width of the sigma points: of the prior sd from the filter's second pass on, of the posterior sd in the batch fit.
     pub spread: f64,
-    /// Whether the study gives that width.
-    pub is_spread_given: bool,
     /// Resample states and parameters before an analysis, for sets of more than p + 1 points.
     pub resample: bool,
     /// Ensembles of the batch fit at most.
@@ -194,6 +206,11 @@ pub struct FleetChoice {
 }
 
 impl Study {
+    /// Width of the sigma points of a fit, as [`EstimatorChoice::spread`].
+    pub fn spread(&self) -> f64 {
+        self.rounding.spread.unwrap_or(self.estimator.spread)
+    }
+
     /// Whether no observer corrects the state during a run.
     pub fn observer_is_off(&self) -> bool {
         self.setup.observer.is_off()

@@ -7,7 +7,7 @@ mod asked;
 pub mod dry_run;
 pub mod on_fleet;
 mod remedy;
-mod rounding;
+pub(crate) mod rounding;
 
 use std::sync::Arc;
 

@@ -18,6 +18,8 @@ pub(crate) const ALIKE: f64 = 0.995;
 pub(crate) struct Twin<'h, 'c> {
     pub(crate) candidate: &'c Candidate,
     pub(crate) result: &'h ScreeningResult,
+    /// Correlation of the two influences.
+    alike: f64,
     /// Whether the part of the gain that the two do not share is beyond the margin: a refit tells which it is.
     pub(crate) is_told_apart: bool,
 }
@@ -54,15 +56,25 @@ pub(crate) fn twins<'h, 'c>(
     let mut twins: Vec<Twin<'h, 'c>> = Vec::new();
     for result in found.screening.iter().filter(|h| h.failure.is_none() && !h.is_absorbed()) {
         let candidate = &candidates[result.candidate];
-        let is_known = twins.iter().any(|twin| twin.candidate.name() == candidate.name());
-        if is_known || is_refitted(result) || result.allowed_gain(candidate.sign()) <= 0.0 {
+        if is_refitted(result) || result.allowed_gain(candidate.sign()) <= 0.0 {
             continue;
         }
         let other = own(result)?;
         let alike = best.dot(&other).abs() / (best.norm() * other.norm());
-        if alike > ALIKE {
-            let is_told_apart = gain * (1.0 - alike * alike) > MARGIN * judged.inflation;
-            twins.push(Twin { candidate, result, is_told_apart });
+        if alike <= ALIKE {
+            continue;
+        }
+        let new = Twin {
+            candidate,
+            result,
+            alike,
+            is_told_apart: gain * (1.0 - alike * alike) > MARGIN * judged.inflation,
+        };
+        match twins.iter_mut().find(|twin| twin.candidate.name() == candidate.name()) {
+            // The point of its grid at which it is most alike stands for it.
+            Some(known) if known.alike < alike => *known = new,
+            Some(_) => {}
+            None => twins.push(new),
         }
     }
     Ok(twins)

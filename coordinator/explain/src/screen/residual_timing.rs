@@ -121,7 +121,7 @@ fn in_stretches(rows: &Rows, predicted: &[f64], of: impl Fn(&[f64], &[f64]) -> V
 /// A change of the residuals.
 #[derive(Clone, Copy)]
 struct Change {
-    /// Over the standard deviation that white noise gives it.
+    /// Over the standard deviation that white noise gives it, with the sign of a jump.
     size: f64,
     at: f64,
     /// How far others are from it, of which it is one.

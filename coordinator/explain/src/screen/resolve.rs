@@ -95,10 +95,14 @@ fn resolved(study: &Study, defs: &[EffectDef], tracks: &[Track], timing: &Timing
         }
         resolved
     };
-    let has_place = |def: &&EffectDef| {
-        !timing.jumps.is_empty() || def.parameters.iter().all(|parameter| parameter.scale != Scale::Jump)
+    // An effect of which a jump is sought is left out where there is none in its range.
+    let has_place = |def: &EffectDef| {
+        let sought = |name: &str| {
+            defs.iter().flat_map(|d| &d.parameters).any(|p| p.name == name && p.scale == Scale::Jump)
+        };
+        def.parameters.iter().all(|parameter| !parameter.grid.is_empty() || !sought(&parameter.name))
     };
-    defs.iter().filter(has_place).map(resolve).filter(scale::is_resolved).collect()
+    defs.iter().map(resolve).filter(scale::is_resolved).filter(has_place).collect()
 }
 
 /// The median interval between observations of the first trained record.

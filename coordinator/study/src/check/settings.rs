@@ -95,7 +95,6 @@ pub(crate) fn estimator(
         passes: counted(source, section.passes.as_ref(), "passes", 1000),
         anneal: anneal(source, section.anneal.as_ref()),
         spread: positive(source, section.spread.as_ref(), "spread", kind.spread),
-        is_spread_given: section.spread.is_some(),
         resample: choose(source, section.resample.as_ref(), "resampling", &resample).unwrap_or(true),
         max_iterations: counted(source, section.max_iterations.as_ref(), "max_iterations", 100_000)
             .unwrap_or(Batch::MAX_ITERATIONS),

@@ -38,7 +38,7 @@ pub(crate) fn fit(
         blocks,
         max_iterations: study.estimator.max_iterations,
         tolerance: study.estimator.tolerance,
-        spread: study.estimator.spread,
+        spread: study.spread(),
     };
     let values: Vec<f64> = windows.iter().flat_map(|(_, w)| w.observed.iter().copied()).collect();
     let noise = noise(study, &windows, 1.0);

@@ -92,7 +92,7 @@ impl<'a> Schedule<'a> {
         if pass > 0 && self.study.drifts() {
             return self.study.theta.iter().zip(sd).map(|(t, sd)| sd.min(t.prior_sd)).collect();
         }
-        let spread = if pass == 0 { 1.0 } else { self.study.estimator.spread };
+        let spread = if pass == 0 { 1.0 } else { self.study.spread() };
         let closest = |prior: f64, sd: f64| narrow * sd.max(CLOSEST * prior).min(spread * prior);
         let open = pass > 0 && self.passes.is_none();
         let scale =

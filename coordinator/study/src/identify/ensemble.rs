@@ -11,7 +11,9 @@ use starlings_models::Window;
 
 use super::IdentifyError;
 use crate::Study;
+
 use crate::fit::runner::{AnalysisIndex, EnsembleRunner, Predicted, Results, StepWindows};
+use crate::trial::rounding;
 
 /// Least distance of the points from their centre, in prior sd: closer, rounding inside the model would show.
 const CLOSEST: f64 = 1e-3;
@@ -44,9 +46,9 @@ pub struct Response {
     pub runs: u64,
 }
 
-/// Distance of the points from their centre, in prior sd.
+/// Distance of the points from their centre, in prior sd; further where a solver rounds, unless the study says how far.
 pub fn spread(study: &Study) -> f64 {
-    study.estimator.spread.max(CLOSEST)
+    study.estimator.spread.max(CLOSEST).max(rounding::apart_in_prior_sd(study))
 }
 
 /// Relative accuracy of central differences at this distance: their error is of second order in it.

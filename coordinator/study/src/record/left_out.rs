@@ -60,8 +60,8 @@ impl ChannelReader<'_> {
             n => (format!("{n} values"), "are", "lines", "each is"),
         };
         Some(format!(
-            "{of} in {} of record `{}` {are} left out ({line} {lines}{more} of `{}`): {they} {} times as far from its neighbours on both sides as \
-             values there are, while these agree, which is a fault of the sensor and no course of a system; `outliers = \"keep\"` in \
+            "{of} in {} of record `{}` {are} left out ({line} {lines}{more} of `{}`): {they} at least {} times as far from the line through its \
+             neighbours as values of the column usually are, while the neighbours agree, which is a fault of the sensor and no course of a system; `outliers = \"keep\"` in \
              the channel keeps {}",
             columns_in_words(&columns),
             self.name(),
@@ -75,7 +75,7 @@ impl ChannelReader<'_> {
         let (found, n, column) = too_many.first()?;
         Some(format!(
             "{found} of {n} values in column `{column}` of record `{}` stand apart from their neighbours, too many to be left out as faults of \
-             single values: the signal has pulses, or its noise heavy tails",
+             single values: the signal has pulses, or its noise heavy tails; empty the cells of those that are faults",
             self.name()
         ))
     }

@@ -43,14 +43,27 @@ pub(super) fn rows_before(
     };
     let own = spec.inputs.iter().zip(inputs).filter(|(input, _)| is_own(&input.name));
     let of_inputs = own.filter_map(|(_, signal)| signal.times.first().copied()).reduce(f64::min);
+    // What is derived from a column may begin later than it.
+    let column = |name: &String| table.csv.index(name).ok().and_then(|column| table.csv.numbers(column).ok());
+    let columns = section.channels.iter().filter_map(|channel| column(channel.column.get_ref()));
+    let is_empty_before = columns
+        .filter_map(|values| values.iter().position(|value| value.is_finite()))
+        .min()
+        .is_some_and(|row| table.times[row] >= first);
     let (earliest, cure) = match of_inputs.filter(|time| *time < first) {
         Some(time) => (time, "where the model is to feel them, with its initial values at that time"),
-        None => (*table.times.first()?, "where the initial values are those at that time"),
+        None => (
+            *table.times.first().filter(|_| is_empty_before)?,
+            "where the initial values are those at that time",
+        ),
     };
     let what = if of_inputs.is_some_and(|time| time < first) {
         format!("its inputs from {earliest} on act before that on nothing but delays")
     } else {
-        format!("the rows of `{}` from {earliest} on hold no value before that", section.file.get_ref())
+        format!(
+            "the rows of `{}` from {earliest} on hold no value of a channel before that",
+            section.file.get_ref()
+        )
     };
     (section.start.is_none() && earliest < first).then(|| {
         format!(

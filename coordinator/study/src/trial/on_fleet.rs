@@ -12,6 +12,7 @@ use starlings_models::{Failure, Job, ParticleError, Prediction, Setup};
 
 use super::dry_run::{Depth, dry_run_by};
 use super::{Runner, TrialError, asked, trial_by};
+use crate::checked::Rounding;
 use crate::predicted::members::setup_of;
 use crate::store::json::json;
 use crate::store::{Store, StoreError};
@@ -38,7 +39,8 @@ pub enum FleetTrialError {
 #[derive(Serialize, Deserialize)]
 struct Found {
     whole_answers: bool,
-    spread: f64,
+    #[serde(default)]
+    rounding: Rounding,
     warnings: Vec<String>,
 }
 
@@ -54,7 +56,7 @@ pub fn trial_on_fleet(
 ) -> Result<(), FleetTrialError> {
     if let Some(found) = store.map(read).transpose()?.flatten() {
         (study.whole_answers, study.warnings) = (found.whole_answers, found.warnings);
-        study.estimator.spread = found.spread;
+        study.rounding = found.rounding;
         return Ok(());
     }
     let setup = study.setup.clone();
@@ -68,8 +70,8 @@ pub fn trial_on_fleet(
     }
     study.warnings.retain(|warning| !warning.contains(check::UNTRIED));
     if let Some(store) = store {
-        let (whole_answers, spread) = (study.whole_answers, study.estimator.spread);
-        let found = Found { whole_answers, spread, warnings: study.warnings.clone() };
+        let (whole_answers, rounding) = (study.whole_answers, study.rounding);
+        let found = Found { whole_answers, rounding, warnings: study.warnings.clone() };
         store.set_meta(FOUND, &json(&found))?;
     }
     Ok(())

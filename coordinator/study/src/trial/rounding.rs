@@ -60,17 +60,19 @@ pub(super) fn heed(study: &mut Study, kind: &Kind, model: &dyn Runner) {
     let variances: f64 = beside.iter().map(|rounded| rounded.variances).sum();
     let Ok(set) = SigmaSet::new(study.estimator.points, study.theta.len()) else { return };
     let per_point = variances / set.n_particle() as f64;
+    study.rounding.variances = per_point;
     let is_filter = matches!(kind.form, Form::Windows(_));
-    let wanted = apart(per_point, is_filter).min(WIDEST[usize::from(!is_filter)]);
-    let usual = study.estimator.spread;
-    if wanted <= usual && per_point <= HOPELESS {
+    // One pass, and a parameter that drifts, have points as far apart as the prior or the posterior.
+    if is_filter && (study.estimator.passes == Some(1) || study.drifts()) {
         return;
     }
-    let wanted = two_digits_up(wanted).max(usual);
-    let is_given = study.estimator.is_spread_given;
-    study.warnings.push(told(&beside, [usual, wanted], is_given, per_point > HOPELESS));
-    if !is_given {
-        study.estimator.spread = wanted;
+    let usual = study.estimator.spread;
+    let wanted = two_digits_up(apart(per_point, is_filter).min(WIDEST[usize::from(!is_filter)]));
+    if per_point > HOPELESS {
+        study.warnings.push(hopeless(&beside));
+    } else if wanted > usual {
+        study.warnings.push(told(&beside, [usual, wanted], study.rounding.is_spread_given));
+        study.rounding.spread = (!study.rounding.is_spread_given).then_some(wanted);
     }
 }
 
@@ -78,6 +80,11 @@ pub(super) fn heed(study: &mut Study, kind: &Kind, model: &dyn Runner) {
 /// in a distance s a slope has the variance of a value over r s².
 fn apart(variances_per_point: f64, is_filter: bool) -> f64 {
     (variances_per_point / if is_filter { OF_PRIOR } else { OF_POSTERIOR }).sqrt()
+}
+
+/// The same in prior sd, for slopes that no fit is made with; zero where nothing is rounded, or the study says how far.
+pub(crate) fn apart_in_prior_sd(study: &Study) -> f64 {
+    if study.rounding.is_spread_given { 0.0 } else { apart(study.rounding.variances, true).min(WIDEST[0]) }
 }
 
 /// The outputs that are rounded at this point; none where a run fails, of which others tell.
@@ -159,27 +166,35 @@ fn two_digits_up(value: f64) -> f64 {
     (value / unit).ceil() * unit
 }
 
-/// What was found, with the remedy.
-fn told(found: &[Rounded], [usual, wanted]: [f64; 2], is_given: bool, is_hopeless: bool) -> String {
+/// What is rounded, to what.
+fn what(found: &[Rounded]) -> String {
     let names: Vec<String> = found.iter().map(|of| of.output.clone()).collect();
     let step = found.iter().map(|of| of.step).fold(0.0, f64::max);
-    let (usual, wanted) = (rounded(usual, 2), rounded(wanted, 2));
-    let what = format!("the solver rounds {} (to {})", quoted_list(&names), rounded(step, 2));
-    let danger = "rounding looks like information: intervals may be far too narrow and estimates anywhere";
-    if is_hopeless {
-        return format!(
-            "{what}, which is coarse beside the noise: however far apart points are placed, {danger}. Let it print more digits (%.17g)."
-        );
-    }
+    format!("the solver rounds {} (to {})", quoted_list(&names), rounded(step, 2))
+}
+
+/// What points bring that are too close together.
+const DANGER: &str =
+    "rounding looks like information: intervals may be far too narrow and estimates anywhere";
+
+fn hopeless(found: &[Rounded]) -> String {
+    format!(
+        "{}, which is coarse beside the noise: however far apart points are placed, {DANGER}. Let it print more digits (%.17g).",
+        what(found)
+    )
+}
+
+fn told(found: &[Rounded], [usual, wanted]: [f64; 2], is_given: bool) -> String {
+    let (what, usual, wanted) = (what(found), rounded(usual, 2), rounded(wanted, 2));
     if is_given {
         return format!(
-            "{what}, and [estimator] spread = {usual} places the points so close together that {danger}. Let it print more digits (%.17g), or \
+            "{what}, and [estimator] spread = {usual} places the points so close together that {DANGER}. Let it print more digits (%.17g), or \
              give spread = {wanted}, or none."
         );
     }
     format!(
-        "{what}: points {usual} apart would differ by little more than that, so they are placed {wanted} apart, as spread = {wanted} in [estimator] \
-         would. With more digits (%.17g) that is not needed."
+        "{what}: points {usual} apart would differ by little more than that, so they are placed up to {wanted} apart, as spread = {wanted} in \
+         [estimator] would. With more digits (%.17g) that is not needed."
     )
 }
 
