@@ -33,6 +33,8 @@ pub struct TrialChannel {
     pub rmse: f64,
     /// Noise sd.
     pub noise: f64,
+    /// Whether the model may have rounded the output.
+    pub looks_rounded: bool,
 }
 
 /// Why the trial failed.
@@ -165,8 +167,9 @@ fn trial_by(study: &Study, model: &dyn Runner) -> Result<Vec<TrialChannel>, Tria
             Fault::Travel(source) => TrialError::Travel { record: record.name.clone(), source },
         })?;
         check_bytes(study, &record.name, &prediction)?;
-        study.measure(index, &window.times, &mut prediction.outputs);
         let n_obs = study.setup.outputs.len();
+        let looks_rounded = rounding::of_outputs(&prediction.outputs, n_obs);
+        study.measure(index, &window.times, &mut prediction.outputs);
         for channel in &record.channels {
             let residuals: Vec<f64> = window
                 .times
@@ -187,6 +190,7 @@ fn trial_by(study: &Study, model: &dyn Runner) -> Result<Vec<TrialChannel>, Tria
                 n_obs: residuals.len(),
                 rmse: (sum / residuals.len().max(1) as f64).sqrt(),
                 noise: channel.noise,
+                looks_rounded: looks_rounded[channel.row],
             });
         }
     }

@@ -77,7 +77,9 @@ pub(super) fn dry_run_by(
             ));
         }
     }
-    rounding::heed(study, kind, model);
+    if channels.iter().any(|channel| channel.looks_rounded) {
+        rounding::heed(study, kind, model);
+    }
     Ok(channels)
 }
 

@@ -44,19 +44,24 @@ struct Rounded {
     variances: f64,
 }
 
-/// Places the points of a study further apart where its solver rounds, and says so; where the study says how far, it is told if that is too near.
+/// Whether each of so many outputs looks rounded in the first run of a trial; it is not made again for that.
+pub(super) fn of_outputs(outputs: &[f64], n: usize) -> Vec<bool> {
+    let is_rounded = |row| steps(&outputs.iter().skip(row).step_by(n).copied().collect::<Vec<_>>()).is_some();
+    (0..n).map(is_rounded).collect()
+}
+
+/// Where outputs look rounded at the prior median, finds out whether the solver rounds them. Places the points of the study further apart then, and
+/// says so; where the study says how far, it is told if that is too near.
 pub(super) fn heed(study: &mut Study, kind: &Kind, model: &dyn Runner) {
     if study.setup.model.kind != SOLVER || kind.has_exact_slopes() {
         return;
     }
     let mean = posterior::prior(study).mean;
     let sd = DVector::from_iterator(mean.len(), study.theta.iter().map(|entry| entry.prior_sd));
-    // Most models are told by their first run: they are not asked again.
-    let at_median = found(study, model, mean.as_slice());
-    if at_median.is_empty() {
+    let beside = found(study, model, (mean + BESIDE * sd).as_slice());
+    if beside.is_empty() {
         return;
     }
-    let beside = found(study, model, (mean + BESIDE * sd).as_slice());
     let variances: f64 = beside.iter().map(|rounded| rounded.variances).sum();
     let Ok(set) = SigmaSet::new(study.estimator.points, study.theta.len()) else { return };
     let per_point = variances / set.n_particle() as f64;
