@@ -181,3 +181,29 @@ fn a_pendulum_lacks_dry_friction_and_a_second_law_of_damping_that_hide_each_othe
         assert!(ratio(&found, "held-out") <= 0.35, "{library}, {noise}: {}", ratio(&found, "held-out"));
     }
 }
+
+#[test]
+fn three_values_far_off_change_nothing_of_what_a_pendulum_lacks() {
+    let (from, folder) = (repository("examples/pendulum"), tempfile::tempdir().unwrap());
+    let study = folder.path().join("study.toml");
+    std::fs::copy(from.join("study.toml"), &study).unwrap();
+    let recording = std::fs::read_to_string(from.join("swing.csv")).unwrap();
+    let spoiled = recording.lines().enumerate().map(|(row, line)| match (row, line.split_once(',')) {
+        // Half a radian off, one of them held out.
+        (500 | 980 | 2432, Some((time, angle))) => format!("{time},{}", angle.parse::<f64>().unwrap() + 0.5),
+        _ => line.to_owned(),
+    });
+    std::fs::write(folder.path().join("swing.csv"), spoiled.collect::<Vec<_>>().join("\n")).unwrap();
+    let (found, clean) = (explained_at(&study), explained("pendulum/study.toml"));
+    assert_eq!(names(&found["effects"]), names(&clean["effects"]), "{}", found["headline"]);
+    let says =
+        "3 values in column `angle` of record `swing` are left out (lines 501, 981, 2433 of `swing.csv`)";
+    let warnings = found["warnings"].as_array().unwrap();
+    assert!(warnings.iter().any(|warning| warning.as_str().unwrap().starts_with(says)), "{warnings:?}");
+    // Taken as they are, they hide it.
+    let kept = std::fs::read_to_string(&study)
+        .unwrap()
+        .replace("noise = 0.001", "noise = 0.001, outliers = \"keep\"");
+    std::fs::write(&study, kept).unwrap();
+    assert_eq!(explained_at(&study)["verdict"], "unexplained");
+}

@@ -32,6 +32,13 @@ fn a_recording_out_of_step_is_refused_with_its_line() {
 }
 
 #[test]
+fn a_treatment_of_outliers_has_no_place_in_an_inference() {
+    let said = STUDY.replacen("output = \"x\"", "output = \"x\", outliers = \"keep\"", 1);
+    assert_ne!(said, STUDY);
+    refused(&said, &recording(2000, usize::MAX), &["an inference uses every value", "remove it"]);
+}
+
+#[test]
 fn what_cannot_be_estimated_is_refused_with_names() {
     let data = recording(2000, usize::MAX);
     let reduced = "[infer.reduced]\nstart = { a = 1.0, b = 1.0, e = 1.0, f = 1.0 }\ncoefficients = { k = \"a*b*e*f\" }\n";

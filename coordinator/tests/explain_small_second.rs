@@ -2,60 +2,22 @@
 #![allow(missing_docs, clippy::unwrap_used)]
 
 mod explained_kit;
+mod rig_kit;
 mod study_kit;
 
 use explained_kit::{explained, noisy};
+use rig_kit::rig;
 use starlings_coordinator::explain::{Explanation, Verdict};
 use study_kit::{Case, csv, grid, normals};
 
-/// A mass on a spring that is shaken, seen by a potentiometer and a velocimeter.
-const RIG: &str = r#"
-[study]
-name = "rig"
-seed = 1
-time_unit = "s"
-
-[model]
-kind = "equations"
-outputs = [ { name = "pot", unit = "m", value = "x" }, { name = "vel", unit = "m/s", value = "v" } ]
-inputs = [ { name = "push", unit = "m/s^2" } ]
-
-[[model.states]]
-name = "x"
-unit = "m"
-role = "displacement"
-initial = 0.01
-rate = { motion = "v" }
-
-[[model.states]]
-name = "v"
-unit = "m/s"
-role = "velocity"
-initial = 0.0
-rate = { push = "gain*push", spring = "-k*x", damping = "-c*v" }
-
-[[parameters]]
-name = "gain"
-unit = "1"
-prior = { transform = "log", median = 1.0, factor = 1.05 }
-
-[[parameters]]
-name = "k"
-unit = "1/s^2"
-prior = { transform = "log", median = 60.0, factor = 1.3 }
-
-[[parameters]]
-name = "c"
-unit = "1/s"
-prior = { transform = "log", median = 1.6, factor = 1.5 }
-
-[[records]]
-name = "rig"
-file = "rig.csv"
-inputs = { push = "push" }
-channels = [ { column = "pot", output = "pot", noise = 0.0008 }, { column = "vel", output = "vel", noise = 0.01 } ]
-train = [0.0, 8.5]
-"#;
+/// The rig, seen by a potentiometer and a velocimeter.
+fn rig_study() -> String {
+    rig(
+        "{ name = \"pot\", unit = \"m\", value = \"x\" }, { name = \"vel\", unit = \"m/s\", value = \"v\" }",
+        "{ column = \"pot\", output = \"pot\", noise = 0.0008 }, { column = \"vel\", output = \"vel\", noise = 0.01 }",
+        "",
+    )
+}
 
 /// A stop beyond a clearance of 45 mm.
 const STOP: &str = r#"
@@ -76,13 +38,13 @@ fn found_with(drift: f64) -> Explanation {
     let push: Vec<f64> = times.iter().map(sweep).collect();
     let recording = |pot: &[f64], vel: &[f64]| csv("time,pot,vel,push", &[&times, pot, vel, &push]);
     let blank = vec![0.0; times.len()];
-    let truth = Case::new(&format!("{RIG}{STOP}"), &[("rig.csv", recording(&blank, &blank))]);
+    let truth = Case::new(&format!("{}{STOP}", rig_study()), &[("rig.csv", recording(&blank, &blank))]);
     let of = |column, sd| noisy(&truth, &[], ("stop", 400.0), column, sd);
     let pot: Vec<f64> = of("pot", 0.0008).iter().zip(&times).map(|(x, t)| x + drift * t).collect();
     // Each channel has a noise of its own.
     let vel: Vec<f64> =
         of("vel", 0.0).iter().zip(normals(times.len(), 6)).map(|(v, e)| v + 0.01 * e).collect();
-    explained(&Case::new(RIG, &[("rig.csv", recording(&pot, &vel))])).unwrap()
+    explained(&Case::new(&rig_study(), &[("rig.csv", recording(&pot, &vel))])).unwrap()
 }
 
 #[test]

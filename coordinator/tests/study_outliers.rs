@@ -3,13 +3,18 @@
 mod study_kit;
 
 use starlings_coordinator::fleet::InProcess;
-use starlings_coordinator::study::Study;
+use starlings_coordinator::study::{SolverHost, Study};
 use study_kit::{Case, csv};
 
 const SPIKES: [(usize, f64); 2] = [(30, 25.0), (71, 40.0)];
 
 /// A cooling body, y = 20 + 60 exp(−t/8), read to a tenth, with these values added; `more` stands in the channel.
 fn cooling(added: &[(usize, f64)], more: &str) -> Case {
+    asking(added, more, "")
+}
+
+/// The same study with this behind it.
+fn asking(added: &[(usize, f64)], more: &str, ask: &str) -> Case {
     let times: Vec<f64> = (0..120).map(|i| 0.25 * f64::from(i)).collect();
     let mut y: Vec<f64> =
         times.iter().map(|t| (10.0 * (20.0 + 60.0 * (-t / 8.0).exp())).round() / 10.0).collect();
@@ -22,12 +27,13 @@ fn cooling(added: &[(usize, f64)], more: &str) -> Case {
 name = "cooling"
 [model]
 kind = "equations"
+constants = {{ room = 20.0 }}
 outputs = [ {{ name = "body", unit = "degC", value = "temperature" }} ]
 [[model.states]]
 name = "temperature"
 unit = "degC"
 initial = 80.0
-rate = "(20 - temperature)/tau"
+rate = "(room - temperature)/tau"
 [[parameters]]
 name = "tau"
 unit = "s"
@@ -37,6 +43,7 @@ name = "monday"
 file = "cooling.csv"
 train = [0, 25]
 channels = [ {{ column = "body", output = "body", {more} }} ]
+{ask}
 "#
     );
     Case::new(&study, &[("cooling.csv", csv("time,body", &[&times, &y]))])
@@ -80,7 +87,7 @@ fn it_is_kept_where_the_channel_says_so_and_where_too_many_are_like_it() {
         many.warnings
     );
     let unknown = cooling(&[], "noise = 0.05, outliers = \"drop\"").refusal().unwrap();
-    assert!(unknown.contains("unknown `outliers = \"drop\"`"), "{unknown}");
+    assert!(unknown.contains("unknown treatment of outliers `drop`"), "{unknown}");
 }
 
 #[test]
@@ -102,4 +109,21 @@ fn an_estimate_and_a_noise_that_is_found_are_those_of_the_record_without_it() {
         (spoiled - clean).abs() > 3.0 * (mended - clean).abs().max(0.01),
         "{spoiled} with noise {of_all}"
     );
+}
+
+#[test]
+fn a_diagnosis_keeps_every_value_unless_the_study_says_otherwise() {
+    let scenario = r#"
+[[diagnose.scenarios]]
+name = "draught"
+parameters = [ { name = "room", unit = "degC", prior = { transform = "linear", median = 10.0, sd = 5.0 } } ]
+"#;
+    for (more, wanted) in [("noise = 0.05", 0), ("noise = 0.05, outliers = \"leave-out\"", 2)] {
+        let case = asking(&SPIKES, more, scenario);
+        let path = case.fresh().with_file_name("study.toml");
+        let diagnosis = Study::load_for_diagnosis(&path, &SolverHost::default())
+            .unwrap_or_else(|error| panic!("{error}"));
+        let studies = [&diagnosis.healthy, &diagnosis.scenarios[0].study];
+        assert_eq!(studies.map(|study| missing(study).len()), [wanted; 2], "{more}");
+    }
 }

@@ -83,6 +83,24 @@ fn inputs_before_the_first_measured_row_are_told_until_the_study_says_where_the_
 }
 
 #[test]
+fn a_record_whose_first_rows_are_empty_is_told_to_begin_later() {
+    let times = grid(60, 0.1);
+    let drive = csv("time,u", &[&[-3.0, 9.0], &[1.0, 1.0]]);
+    let told = |empty: usize, record: &str| {
+        let y: Vec<f64> = (0..60).map(|i| if i < empty { f64::NAN } else { 0.9 }).collect();
+        let shown = csv("time,y", &[&times, &y]);
+        let study =
+            filter_with("u = \"drive.csv:u\"", record, &[("step.csv", shown), ("drive.csv", drive.clone())])
+                .study();
+        study.warnings.iter().find(|w| w.contains("first measured row")).cloned()
+    };
+    let says = "record `step` begins with its first measured row, at 0.1: the rows of `step.csv` from 0 on hold no value of a channel before \
+                that. Write `start = 0`";
+    assert!(told(1, "").is_some_and(|told| told.starts_with(says)), "{:?}", told(1, ""));
+    assert_eq!((told(0, ""), told(1, "start = 0.0"), told(1, "start = 0.1")), (None, None, None));
+}
+
+#[test]
 fn a_run_that_would_begin_late_or_without_its_input_is_refused() {
     let late = fault(&filter("start = 0.5"));
     assert!(late.contains("record `step` starts at 0.5, after its first measured row"), "{late}");

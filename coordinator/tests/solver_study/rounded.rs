@@ -1,5 +1,6 @@
 //! A solver that prints few digits: the points are placed further apart, and the posterior is that of the solver that prints all.
 
+use starlings_coordinator::study::identify::{At, identify};
 use starlings_coordinator::study::trial::{Depth, dry_run};
 use starlings_coordinator::study::{Study, Summary};
 
@@ -76,4 +77,29 @@ fn a_width_that_the_study_gives_is_kept_and_told_to_be_too_narrow() {
     // Half of the noise.
     let (_, said) = told("", 2);
     assert!(said.contains("which is coarse beside the noise: however far apart points are placed"), "{said}");
+}
+
+#[test]
+fn points_that_are_too_close_make_intervals_too_narrow_which_is_what_the_distance_is_for() {
+    let of = |more: &str, decimals| summary(&tried(more, decimals));
+    let (want, got) = (of("", None), of("[estimator]\nspread = 0.001\n", Some(3)));
+    let narrow =
+        want.parameters.iter().zip(&got.parameters).map(|(want, got)| want.sd / got.sd).fold(0.0, f64::max);
+    assert!(narrow > 7.0, "{narrow}");
+}
+
+#[test]
+fn sensitivities_are_of_runs_that_rounding_does_not_drown() {
+    let found = |decimals| {
+        let (_, study, inside) = tried("", decimals);
+        identify(&study, &mut threads(&inside), &At::Prior, &mut |_| {}).unwrap()
+    };
+    let (exact, rounded) = (found(None), found(Some(3)));
+    assert!(
+        (exact.spread - 1e-3).abs() < 1e-12 && (0.1..=0.3).contains(&rounded.spread),
+        "{}",
+        rounded.spread
+    );
+    let off = (&rounded.whitened - &exact.whitened).norm() / exact.whitened.norm();
+    assert!(off < 0.05, "{off}");
 }
