@@ -17,6 +17,9 @@ const ALONE: f64 = 4.0;
 /// Values of a record without which nothing is said.
 const FEWEST: usize = 20;
 
+/// Of the values of a series one in so many may be a fault; where more stand apart, that is how the signal or its noise is.
+const ONE_IN: usize = 50;
+
 /// Standard deviation of a value's distance from the middle of its neighbours, for independent errors of standard deviation 1.
 const OF_NOISE: f64 = 1.224_744_871_391_589;
 
@@ -65,6 +68,12 @@ pub fn outliers(times: &[f64], values: &[f64], noise: Option<f64>) -> Vec<Outlie
     found
         .map(|i| Outlier { at: known[i], distance: distances[i - 1], times: distances[i - 1] / scatter })
         .collect()
+}
+
+/// Whether so many outliers of a series are too many to be faults of single values: the signal has pulses then, or its noise heavy tails.
+pub fn are_too_many(outliers: &[Outlier], values: &[f64]) -> bool {
+    let n = values.iter().filter(|value| value.is_finite()).count();
+    outliers.len() > (n / ONE_IN).max(1)
 }
 
 /// The step of values that were rounded: the smallest difference of neighbours that is none of rounding numbers.

@@ -95,7 +95,8 @@ fn foresee(cache: &mut RunCache<'_>, candidates: &[Candidate], options: &Options
     cache.foreseen.candidates(tried().count(), tried().map(|c| c.points.len()).sum());
 }
 
-/// Decides, refits what cannot be told from it to first order, and goes on with generic terms, with proposals and with pairs while nothing explains the gap, or with other forms of what explains it.
+/// Decides, refits what cannot be told from it to first order, and goes on with generic terms, with proposals and with pairs while nothing
+/// explains the gap, or with other forms of what explains it.
 /// `proposed` takes the candidates with the proposals, where any are made. With the decision come the unknown inputs of the model as it is.
 fn decide_further<'c>(
     cache: &mut RunCache<'_>,

@@ -4,8 +4,8 @@
 //! [`misfit`], [`adequacy`] (residuals against the stated noise), [`uncertainty`] (what the uncertainty of an estimate explains),
 //! [`held_out`], [`form`] (whether an effect has the right form), [`gates`], [`search_result`] (all that was judged),
 //! [`noise_model`] (whether the noise is correlated), [`contribution`] (whether every effect takes away its share), [`larger_noise`]
-//! (whether a noise that was found is larger), [`objections`] (what speaks against a name), [`rivals`] (what comes as close), [`twins`] (what has the same influence), [`verdict`],
-//! [`probability`] (how probable each answer is).
+//! (whether a noise that was found is larger), [`objections`] (what speaks against a name), [`rivals`] (what comes as close),
+//! [`twins`] (what has the same influence), [`verdict`], [`probability`] (how probable each answer is).
 
 pub(crate) mod adequacy;
 pub(crate) mod contribution;

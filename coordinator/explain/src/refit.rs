@@ -1,7 +1,8 @@
 //! The search: refits of the best candidates, then a second pass from the best of them with replacements and pairs.
 //!
-//! Files: [`search`], [`further`] (kinds that are tried last), [`race`], [`near_priors`] (a second start), [`instants`], [`ranking`], [`replacements`] of terms, [`pairs`], their [`members`] and [`finite`] where no effect explains the gap alone, [`simpler`] terms in a pair, [`second_pass`], [`twins`] of what is told, and
-//! [`modulated_forms`], whose effects ask whether the form of an effect is right.
+//! Files: [`search`], [`further`] (kinds that are tried last), [`race`], [`near_priors`] (a second start), [`instants`], [`ranking`],
+//! [`replacements`] of terms, [`pairs`], their [`members`] and [`finite`] where no effect explains the gap alone, [`simpler`] terms in a
+//! pair, [`second_pass`], [`twins`] of what is told, and [`modulated_forms`], whose effects ask whether the form of an effect is right.
 
 mod finite;
 pub(crate) mod further;

@@ -5,7 +5,7 @@
 //! rows scatter together; noise may be larger in some states than in others, so that a value has to stand apart from the rows near it
 //! alone, too. Next file to read: `doubts.rs`, for what is doubtful of a recording as a whole.
 
-use starlings_estimators::outliers;
+use starlings_estimators::{are_too_many, outliers};
 use starlings_models::units::rounded;
 use starlings_study::infer_choice::{InferChoice, InferRecord, MeasuredChoice};
 
@@ -19,8 +19,6 @@ const MOST: f64 = 2e6;
 const HELD: usize = 1 << 16;
 /// Rows on either side of a value that it has to stand apart from.
 const AROUND: usize = 32;
-/// Of the values that are held one in so many may stand apart: where more do, the state has pulses, or its noise heavy tails.
-const ONE_IN: usize = 50;
 /// Values that are named at most.
 const NAMED: usize = 4;
 
@@ -122,11 +120,12 @@ fn apart(times: &[f64], values: &[f64], choice: &InferChoice) -> Vec<(usize, f64
         let found = outliers(&times[from..to], &values[from..to], noise);
         found.into_iter().find(|near| near.at + from == at)
     };
-    let all = outliers(times, values, noise).into_iter();
-    if all.len() > (values.len() / ONE_IN).max(1) {
+    let all = outliers(times, values, noise);
+    if are_too_many(&all, values) {
         return Vec::new();
     }
-    all.filter_map(|stray| near(stray.at).map(|near| (stray.at, near.distance, near.times.min(stray.times))))
+    all.into_iter()
+        .filter_map(|stray| near(stray.at).map(|near| (stray.at, near.distance, near.times.min(stray.times))))
         .collect()
 }
 

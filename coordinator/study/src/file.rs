@@ -18,7 +18,7 @@ mod roles;
 mod settings;
 pub(super) mod solver;
 pub(super) mod spectrum;
-mod table;
+pub(super) mod table;
 
 use std::ops::Range;
 

@@ -168,7 +168,7 @@ fn trial_by(study: &Study, model: &dyn Runner) -> Result<Vec<TrialChannel>, Tria
         })?;
         check_bytes(study, &record.name, &prediction)?;
         let n_obs = study.setup.outputs.len();
-        let looks_rounded = rounding::of_outputs(&prediction.outputs, n_obs);
+        let looks_rounded = rounding::of_outputs(study, &prediction.outputs);
         study.measure(index, &window.times, &mut prediction.outputs);
         for channel in &record.channels {
             let residuals: Vec<f64> = window

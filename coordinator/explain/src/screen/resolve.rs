@@ -64,7 +64,7 @@ fn instants(def: &EffectDef) -> Vec<String> {
 
 /// The effects with their numbers in the model's units. An effect whose quantity is constant along the run is left out, since its
 /// numbers count in the course of that quantity. A duration inside a term is screened at the dominant periods of the residuals,
-/// an instant at their change points as well ([`super::residual_timing`]).
+/// an instant at their change points as well, and a jump at theirs alone ([`super::residual_timing`]).
 fn resolved(study: &Study, defs: &[EffectDef], tracks: &[Track], timing: &Timing) -> Vec<EffectDef> {
     let course = |name: &str| tracks.iter().find(|t| t.name == name).map(Track::ends);
     let times = || study.records.iter().filter(|r| r.is_trained()).filter_map(Record::train_span);
@@ -72,6 +72,9 @@ fn resolved(study: &Study, defs: &[EffectDef], tracks: &[Track], timing: &Timing
     let to = times().map(|s| s[1]).fold(f64::NEG_INFINITY, f64::max);
     let resolve = |def: &EffectDef| {
         let mut resolved = scale::resolve(def, &course, [from, to], sampling(study));
+        if !scale::is_resolved(&resolved) {
+            return None;
+        }
         for wanted in def.parameters.iter().skip(1) {
             let Some(parameter) = resolved.parameters.iter_mut().find(|p| p.name == wanted.name) else {
                 continue;
@@ -84,6 +87,8 @@ fn resolved(study: &Study, defs: &[EffectDef], tracks: &[Track], timing: &Timing
                     parameter.grid = within(&timing.periods);
                 }
                 Scale::Record => parameter.grid.extend(within(&timing.change_points)),
+                // Without a jump in its range there is nothing to seek.
+                Scale::Jump if within(&timing.jumps).is_empty() => return None,
                 Scale::Jump => parameter.grid = within(&timing.jumps),
                 Scale::Absolute if instants(def).contains(&wanted.name) => {
                     let further = timing.jumps.iter().filter(|at| !timing.change_points.contains(at));
@@ -93,16 +98,9 @@ fn resolved(study: &Study, defs: &[EffectDef], tracks: &[Track], timing: &Timing
                 _ => {}
             }
         }
-        resolved
+        Some(resolved)
     };
-    // An effect of which a jump is sought is left out where there is none in its range.
-    let has_place = |def: &EffectDef| {
-        let sought = |name: &str| {
-            defs.iter().flat_map(|d| &d.parameters).any(|p| p.name == name && p.scale == Scale::Jump)
-        };
-        def.parameters.iter().all(|parameter| !parameter.grid.is_empty() || !sought(&parameter.name))
-    };
-    defs.iter().map(resolve).filter(scale::is_resolved).filter(has_place).collect()
+    defs.iter().filter_map(resolve).collect()
 }
 
 /// The median interval between observations of the first trained record.

@@ -7,8 +7,9 @@ use starlings_models::effect::library::{FAMILIES, library};
 use starlings_models::{BuildSetup, ModelDef, Setup};
 use toml::Spanned;
 
-use super::settings::{choose, counted};
+use super::settings::counted;
 use crate::checked::{ExplainChoice, Library, PROPOSALS, Record};
+use crate::file::table::choose;
 use crate::file::{ChannelSection, StudyFile};
 use crate::problem::Source;
 

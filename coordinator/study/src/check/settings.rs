@@ -7,6 +7,7 @@ use starlings_models::{Description, ObserverDef};
 use toml::Spanned;
 
 use crate::checked::{EstimatorChoice, FleetChoice};
+use crate::file::table::choose;
 use crate::file::{EstimatorSection, FleetSection, ObserverSection};
 use crate::problem::Source;
 
@@ -143,22 +144,6 @@ fn timeout_factor(source: &Source, given: &Spanned<f64>) -> Option<f64> {
     let help = "20 ends a run that takes twenty times as long as runs usually do";
     source.report_with(given.span(), format!("`timeout_factor` must be from 2 to 1e6, found {factor}"), help);
     None
-}
-
-/// The choice behind a word; an unknown word is reported.
-pub(super) fn choose<T: Copy>(
-    source: &Source,
-    word: Option<&Spanned<String>>,
-    what: &str,
-    choices: &[(&str, T)],
-) -> Option<T> {
-    let word = word?;
-    let found = choices.iter().find(|(name, _)| name == word.get_ref()).map(|(_, choice)| *choice);
-    if found.is_none() {
-        let valid: Vec<String> = choices.iter().map(|(name, _)| (*name).to_owned()).collect();
-        source.report_unknown(word.span(), format!("unknown {what} `{}`", word.get_ref()), &valid);
-    }
-    found
 }
 
 /// A count from 1 to `most`.

@@ -4,7 +4,7 @@
 
 use toml::Spanned;
 
-use super::table::{Node, Table, number, wrong_type};
+use super::table::{Node, Table, choose, number, wrong_type};
 use crate::problem::Source;
 
 /// One entry of `channels`.
@@ -52,16 +52,8 @@ pub(crate) enum Outliers {
 
 /// Whether a record, or a channel, is to be left out of every fit.
 pub(super) fn held_out(source: &Source, of: &Table<'_>) -> bool {
-    match of.text("use") {
-        None => false,
-        Some(text) if text.get_ref() == "held-out" => true,
-        Some(text) if text.get_ref() == "train" => false,
-        Some(text) => {
-            let valid = ["train".to_owned(), "held-out".to_owned()];
-            source.report_unknown(text.span(), format!("unknown use `{}`", text.get_ref()), &valid);
-            false
-        }
-    }
+    let words = [("train", false), ("held-out", true)];
+    choose(source, of.text("use").as_ref(), "use", &words).unwrap_or(false)
 }
 
 /// The channels of a record; an inference finds their noise by itself.
@@ -104,19 +96,12 @@ pub(super) fn channels(source: &Source, record: &Table<'_>, infers: bool) -> Vec
     record.tables("channels", "a channel", &keys).into_iter().map(read).collect()
 }
 
-/// What a channel says of outliers; an unknown word is reported.
+/// What a channel says of outliers.
 fn outliers(source: &Source, channel: &Table<'_>) -> Option<Spanned<Outliers>> {
-    let text = channel.text("outliers")?;
-    let found = match text.get_ref().as_str() {
-        "leave-out" => Outliers::LeaveOut,
-        "keep" => Outliers::Keep,
-        unknown => {
-            let valid = ["leave-out".to_owned(), "keep".to_owned()];
-            source.report_unknown(text.span(), format!("unknown `outliers = \"{unknown}\"`"), &valid);
-            return None;
-        }
-    };
-    Some(Spanned::new(text.span(), found))
+    let word = channel.text("outliers")?;
+    let words = [("leave-out", Outliers::LeaveOut), ("keep", Outliers::Keep)];
+    let found = choose(source, Some(&word), "treatment of outliers", &words)?;
+    Some(Spanned::new(word.span(), found))
 }
 
 /// Open ends of a mesh where the study does not say: a tube's.

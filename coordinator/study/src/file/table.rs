@@ -242,3 +242,19 @@ pub(crate) fn named_texts(source: &Source, entries: &[(Spanned<String>, &Node<'_
     };
     entries.iter().filter_map(read).collect()
 }
+
+/// The choice behind a word; an unknown word is reported.
+pub(crate) fn choose<T: Copy>(
+    source: &Source,
+    word: Option<&Spanned<String>>,
+    what: &str,
+    choices: &[(&str, T)],
+) -> Option<T> {
+    let word = word?;
+    let found = choices.iter().find(|(name, _)| name == word.get_ref()).map(|(_, choice)| *choice);
+    if found.is_none() {
+        let valid: Vec<String> = choices.iter().map(|(name, _)| (*name).to_owned()).collect();
+        source.report_unknown(word.span(), format!("unknown {what} `{}`", word.get_ref()), &valid);
+    }
+    found
+}

@@ -2,16 +2,13 @@
 //!
 //! Next file to read: `outliers.rs` of the estimators, for what is one.
 
-use starlings_estimators::{Outlier, outliers};
+use starlings_estimators::{Outlier, are_too_many, outliers};
 use starlings_models::quoted_list;
 use starlings_models::units::rounded;
 
 use super::part::Part;
 use super::reader::ChannelReader;
 use crate::file::{ChannelSection, Outliers};
-
-/// Of the values of a column, one in so many may be left out; where more stand apart, that is how the signal or its noise is.
-const ONE_IN: usize = 50;
 
 /// Lines that a warning names; of more it tells their number.
 const NAMED: usize = 3;
@@ -30,9 +27,8 @@ impl ChannelReader<'_> {
         let (mut left_out, mut too_many) = (Vec::new(), Vec::new());
         for (values, part) in measured {
             let found = outliers(&self.table.times, values, noise);
-            let n = values.iter().filter(|value| value.is_finite()).count();
-            if found.len() > (n / ONE_IN).max(1) {
-                too_many.push((found.len(), n, part.column.clone()));
+            if are_too_many(&found, values) {
+                too_many.push((found.len(), values.len(), part.column.clone()));
                 continue;
             }
             for outlier in found {

@@ -35,6 +35,9 @@ pub(super) fn rows_before(
     spec: &Spec,
 ) -> Option<String> {
     let first = *times.first()?;
+    if section.start.is_some() {
+        return None;
+    }
     let is_own = |name: &String| {
         section
             .inputs
@@ -43,35 +46,35 @@ pub(super) fn rows_before(
     };
     let own = spec.inputs.iter().zip(inputs).filter(|(input, _)| is_own(&input.name));
     let of_inputs = own.filter_map(|(_, signal)| signal.times.first().copied()).reduce(f64::min);
-    // What is derived from a column may begin later than it.
+    let (earliest, what, cure) = if let Some(earliest) = of_inputs.filter(|time| *time < first) {
+        (
+            earliest,
+            format!("its inputs from {earliest} on act before that on nothing but delays"),
+            "where the model is to feel them, with its initial values at that time",
+        )
+    } else {
+        let earliest =
+            *table.times.first().filter(|time| **time < first && is_empty_before(section, table, first))?;
+        let file = section.file.get_ref();
+        (
+            earliest,
+            format!("the rows of `{file}` from {earliest} on hold no value of a channel before that"),
+            "where the initial values are those at that time",
+        )
+    };
+    Some(format!(
+        "record `{}` begins with its first measured row, at {first}: {what}. Write `start = {earliest}` in the record {cure}; \
+         `start = {first}` keeps the run as it is.",
+        section.name.get_ref()
+    ))
+}
+
+/// Whether no column of a channel has a value before a time: what is derived from one may begin later.
+fn is_empty_before(section: &RecordSection, table: &Table, first: f64) -> bool {
     let column = |name: &String| table.csv.index(name).ok().and_then(|column| table.csv.numbers(column).ok());
     let columns = section.channels.iter().filter_map(|channel| column(channel.column.get_ref()));
-    let is_empty_before = columns
-        .filter_map(|values| values.iter().position(|value| value.is_finite()))
-        .min()
-        .is_some_and(|row| table.times[row] >= first);
-    let (earliest, cure) = match of_inputs.filter(|time| *time < first) {
-        Some(time) => (time, "where the model is to feel them, with its initial values at that time"),
-        None => (
-            *table.times.first().filter(|_| is_empty_before)?,
-            "where the initial values are those at that time",
-        ),
-    };
-    let what = if of_inputs.is_some_and(|time| time < first) {
-        format!("its inputs from {earliest} on act before that on nothing but delays")
-    } else {
-        format!(
-            "the rows of `{}` from {earliest} on hold no value of a channel before that",
-            section.file.get_ref()
-        )
-    };
-    (section.start.is_none() && earliest < first).then(|| {
-        format!(
-            "record `{}` begins with its first measured row, at {first}: {what}. Write `start = {earliest}` in the record {cure}; \
-             `start = {first}` keeps the run as it is.",
-            section.name.get_ref()
-        )
-    })
+    let rows = columns.filter_map(|values| values.iter().position(|value| value.is_finite()));
+    rows.min().is_some_and(|row| table.times[row] >= first)
 }
 
 /// The span of the first rows of a held-out record that its initial values are found from; `None` where the study gives none, or

@@ -78,7 +78,7 @@ pub(super) fn dry_run_by(
         }
     }
     if channels.iter().any(|channel| channel.looks_rounded) {
-        rounding::heed(study, kind, model);
+        rounding::heed(study, model);
     }
     Ok(channels)
 }

@@ -7,7 +7,7 @@
 use std::sync::Arc;
 
 use nalgebra::DVector;
-use starlings_estimators::{Form, Kind, SigmaSet};
+use starlings_estimators::SigmaSet;
 use starlings_models::units::rounded;
 use starlings_models::{SOLVER, Window, quoted_list};
 
@@ -23,14 +23,19 @@ const FEWEST: usize = 8;
 /// Where the second run is made, in prior sd from the median.
 const BESIDE: f64 = 0.0577;
 
-/// Share of the prior's information that rounding may seem to bring, in a filter, whose points lie in prior sd; ...
-const OF_PRIOR: f64 = 0.25;
+/// How far apart points have to be.
+struct Rule {
+    /// Share of the information in whose sd the points lie that rounding may seem to bring.
+    share: f64,
+    /// Sd from each other at most: further off a model bends.
+    widest: f64,
+}
 
-/// ... and of the posterior's in a fit of whole records, whose points lie in posterior sd.
-const OF_POSTERIOR: f64 = 0.002;
+/// A filter's points lie in prior sd ...
+const OF_PRIOR: Rule = Rule { share: 0.25, widest: 0.3 };
 
-/// How far apart points are placed at most, prior sd of a filter: further off a model bends. A fit of whole records places them within a posterior sd.
-const WIDEST: [f64; 2] = [0.3, 1.0];
+/// ... and those of a fit of whole records in posterior sd.
+const OF_POSTERIOR: Rule = Rule { share: 0.002, widest: 1.0 };
 
 /// Share of the posterior's information that rounding seems to bring where the points are a posterior sd apart, beyond which no distance helps.
 const HOPELESS: f64 = 0.02;
@@ -44,16 +49,18 @@ struct Rounded {
     variances: f64,
 }
 
-/// Whether each of so many outputs looks rounded in the first run of a trial; it is not made again for that.
-pub(super) fn of_outputs(outputs: &[f64], n: usize) -> Vec<bool> {
-    let is_rounded = |row| steps(&outputs.iter().skip(row).step_by(n).copied().collect::<Vec<_>>()).is_some();
-    (0..n).map(is_rounded).collect()
+/// Whether each output of a solver looks rounded in the first run of a trial, which is not made again for that.
+pub(super) fn of_outputs(study: &Study, outputs: &[f64]) -> Vec<bool> {
+    let n = study.setup.outputs.len();
+    let is_solver = study.setup.model.kind == SOLVER;
+    let course = |row| outputs.iter().skip(row).step_by(n).copied().collect::<Vec<_>>();
+    (0..n).map(|row| is_solver && steps(&course(row)).is_some()).collect()
 }
 
 /// Where outputs look rounded at the prior median, finds out whether the solver rounds them. Places the points of the study further apart then, and
 /// says so; where the study says how far, it is told if that is too near.
-pub(super) fn heed(study: &mut Study, kind: &Kind, model: &dyn Runner) {
-    if study.setup.model.kind != SOLVER || kind.has_exact_slopes() {
+pub(super) fn heed(study: &mut Study, model: &dyn Runner) {
+    if study.estimator.kind.has_exact_slopes() {
         return;
     }
     let mean = posterior::prior(study).mean;
@@ -66,13 +73,13 @@ pub(super) fn heed(study: &mut Study, kind: &Kind, model: &dyn Runner) {
     let Ok(set) = SigmaSet::new(study.estimator.points, study.theta.len()) else { return };
     let per_point = variances / set.n_particle() as f64;
     study.rounding.variances = per_point;
-    let is_filter = matches!(kind.form, Form::Windows(_));
+    let is_filter = study.estimator.kind.is_filter();
     // One pass, and a parameter that drifts, have points as far apart as the prior or the posterior.
     if is_filter && (study.estimator.passes == Some(1) || study.drifts()) {
         return;
     }
     let usual = study.estimator.spread;
-    let wanted = two_digits_up(apart(per_point, is_filter).min(WIDEST[usize::from(!is_filter)]));
+    let wanted = two_digits_up(apart(per_point, if is_filter { &OF_PRIOR } else { &OF_POSTERIOR }));
     if per_point > HOPELESS {
         study.warnings.push(hopeless(&beside));
     } else if wanted > usual {
@@ -83,13 +90,13 @@ pub(super) fn heed(study: &mut Study, kind: &Kind, model: &dyn Runner) {
 
 /// The distance of points at which the slopes, which rounding makes uncertain, seem to bring no more than a share of the information: with r points
 /// in a distance s a slope has the variance of a value over r s².
-fn apart(variances_per_point: f64, is_filter: bool) -> f64 {
-    (variances_per_point / if is_filter { OF_PRIOR } else { OF_POSTERIOR }).sqrt()
+fn apart(variances_per_point: f64, rule: &Rule) -> f64 {
+    (variances_per_point / rule.share).sqrt().min(rule.widest)
 }
 
 /// The same in prior sd, for slopes that no fit is made with; zero where nothing is rounded, or the study says how far.
 pub(crate) fn apart_in_prior_sd(study: &Study) -> f64 {
-    if study.rounding.is_spread_given { 0.0 } else { apart(study.rounding.variances, true).min(WIDEST[0]) }
+    if study.rounding.is_spread_given { 0.0 } else { apart(study.rounding.variances, &OF_PRIOR) }
 }
 
 /// The outputs that are rounded at this point; none where a run fails, of which others tell.

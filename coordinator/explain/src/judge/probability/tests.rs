@@ -1,3 +1,5 @@
+//! Probabilities sum to one, and a verdict is worth what it was counted to be.
+
 use super::*;
 
 #[test]

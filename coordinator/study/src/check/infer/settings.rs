@@ -8,9 +8,10 @@ use starlings_models::{PolynomialDef, SumsDef};
 use toml::Spanned;
 
 use crate::check::prior;
-use crate::check::settings::{choose, counted};
+use crate::check::settings::counted;
 use crate::file::StudyFile;
 use crate::file::infer::{FollowSection, InferSection, Rules, WordOrNumber};
+use crate::file::table::choose;
 use crate::infer_choice::{DiffusionChoice, FollowChoice, MeasuredChoice};
 use crate::problem::Source;
 
