@@ -10,11 +10,13 @@ mod bucket;
 pub mod error;
 mod files;
 pub mod folder;
+pub mod mapped;
 pub mod memory;
 pub mod place;
 
 pub use error::PieceError;
 pub use folder::{Folder, Staged};
+pub use mapped::Mapped;
 pub use memory::SharedMemory;
 pub use place::PlaceName;
 

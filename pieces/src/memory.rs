@@ -7,6 +7,7 @@ use std::fs::File;
 use std::io;
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
 use std::os::unix::fs::FileExt;
+use std::sync::Arc;
 
 use rustix::fs::{MemfdFlags, SealFlags, fcntl_add_seals, fcntl_get_seals, fstat, ftruncate, memfd_create};
 
@@ -18,7 +19,7 @@ const ALL: SealFlags = LENGTH.union(SealFlags::WRITE).union(SealFlags::SEAL);
 
 /// Memory of a fixed length under a descriptor.
 #[derive(Debug)]
-pub struct SharedMemory(File);
+pub struct SharedMemory(pub(crate) Arc<File>);
 
 impl SharedMemory {
     /// Memory of so many bytes, all zero; the system gives each page when it is written.
@@ -29,7 +30,7 @@ impl SharedMemory {
         let file = memfd_create("starlings-state", MemfdFlags::CLOEXEC | MemfdFlags::ALLOW_SEALING)?;
         ftruncate(&file, bytes as u64)?;
         fcntl_add_seals(&file, LENGTH)?;
-        Ok(Self(file.into()))
+        Ok(Self(Arc::new(file.into())))
     }
 
     /// The memory of a descriptor that came from another process, which must have this length for ever, and, where `sealed`, its bytes.
@@ -48,7 +49,7 @@ impl SharedMemory {
         if u64::try_from(length).ok() != Some(bytes as u64) {
             return Err(wrong(format!("{length} bytes of memory where {bytes} belong")));
         }
-        Ok(Self(descriptor.into()))
+        Ok(Self(Arc::new(descriptor.into())))
     }
 
     /// From now on nobody can change it.
@@ -56,7 +57,7 @@ impl SharedMemory {
     /// # Errors
     /// When a process has mapped it for writing, or it is sealed already.
     pub fn seal(&self) -> io::Result<()> {
-        Ok(fcntl_add_seals(&self.0, ALL)?)
+        Ok(fcntl_add_seals(&*self.0, ALL)?)
     }
 
     /// Writes from this byte on.

@@ -85,13 +85,16 @@ pub(crate) fn read(
     }
 }
 
-/// Writes a state into memory that was lent.
-pub(crate) fn fill(memory: &SharedMemory, values: &[f64]) -> std::io::Result<()> {
+/// Writes a state into memory that was lent, as `write` writes bytes from a byte on.
+pub(crate) fn fill(
+    values: &[f64],
+    write: impl Fn(&[u8], usize) -> std::io::Result<()>,
+) -> std::io::Result<()> {
     if cfg!(target_endian = "little") {
-        return memory.write(bytemuck::cast_slice(values), 0);
+        return write(bytemuck::cast_slice(values), 0);
     }
     let mut pieces = values.chunks(CHUNK_VALUES).enumerate();
-    pieces.try_for_each(|(index, values)| memory.write(&floats::encode(values), index * CHUNK_BYTES))
+    pieces.try_for_each(|(index, values)| write(&floats::encode(values), index * CHUNK_BYTES))
 }
 
 /// Says that a state stands in the memory that was lent under this number.

@@ -5,8 +5,9 @@
 //! costs more than all else of a state's way. Next file to read: `memory`.
 
 use std::os::fd::{AsFd, BorrowedFd};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
+use starlings_pieces::Mapped;
 use starlings_proto::convert::state::CHUNK_BYTES;
 
 use crate::memory::Memory;
@@ -18,11 +19,13 @@ use crate::{StateError, StateWriter, StoredState};
 pub struct Lent {
     memory: Memory,
     n_state: usize,
+    /// Its addresses, from the first state on.
+    mapped: OnceLock<Option<Mapped>>,
 }
 
 impl Lent {
     pub(crate) fn new(store: &Arc<Shared>, n_state: usize) -> Option<Self> {
-        Some(Self { memory: store.whole(n_state, true)?, n_state })
+        Some(Self { memory: store.whole(n_state, true)?, n_state, mapped: OnceLock::new() })
     }
 
     /// Values of the states that it is for.
@@ -35,10 +38,14 @@ impl Lent {
     /// # Errors
     /// [`StateError::NotFinite`] when a value is not finite; others when the store cannot keep it.
     pub fn copy(&self, mut writer: StateWriter) -> Result<StoredState, StateError> {
+        let mapped = self.mapped.get_or_init(|| self.memory.map());
         let (mut buffer, mut at) = (vec![0; CHUNK_BYTES], 0);
         while writer.wanted() > 0 {
             let bytes = &mut buffer[..8 * writer.wanted()];
-            self.memory.read(bytes, at)?;
+            match mapped {
+                Some(mapped) => mapped.read(bytes, at).map_err(Memory::failed("read"))?,
+                None => self.memory.read(bytes, at)?,
+            }
             if let Some(value) = not_finite(bytes) {
                 return Err(StateError::NotFinite { value });
             }

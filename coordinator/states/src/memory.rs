@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use bytes::Bytes;
 use rustix::process::{Resource, getrlimit};
-use starlings_pieces::SharedMemory;
+use starlings_pieces::{Mapped, SharedMemory};
 
 use crate::StateError;
 
@@ -88,7 +88,12 @@ impl Memory {
         self.room.taken.bytes.fetch_sub(bytes, Ordering::Relaxed);
     }
 
-    fn failed(what: &'static str) -> impl Fn(std::io::Error) -> StateError {
+    /// Its addresses, where the system has some left.
+    pub(crate) fn map(&self) -> Option<Mapped> {
+        self.shared.map().ok()
+    }
+
+    pub(crate) fn failed(what: &'static str) -> impl Fn(std::io::Error) -> StateError {
         move |source| StateError::Memory { what, source: Arc::new(source) }
     }
 

@@ -4,7 +4,7 @@
 
 use std::sync::{MutexGuard, PoisonError};
 
-use starlings_pieces::SharedMemory;
+use starlings_pieces::{Mapped, SharedMemory};
 use starlings_proto::StateId;
 use starlings_proto::convert::lent::{GiveBack, Lend, NOT_LENT};
 use starlings_proto::convert::state::PutHead;
@@ -19,13 +19,29 @@ pub(super) struct LentMemory {
     number: u64,
     n_state: usize,
     memory: SharedMemory,
+    /// Its addresses, once the first state has made the system give its pages: where it has none left, that is an error and no signal.
+    mapped: Option<Mapped>,
+}
+
+impl LentMemory {
+    /// Writes a state into it.
+    fn fill(&mut self, values: &[f64]) -> std::io::Result<()> {
+        match &self.mapped {
+            Some(mapped) => pieces::fill(values, |bytes, at| mapped.write(bytes, at)),
+            None => {
+                pieces::fill(values, |bytes, at| self.memory.write(bytes, at))?;
+                self.mapped = self.memory.map().ok();
+                Ok(())
+            }
+        }
+    }
 }
 
 impl Transfers {
     /// Puts a state by memory that was lent; `None` where it has to go in pieces.
     pub(super) fn put_in_memory(&self, head: PutHead, values: &[f64]) -> Option<Result<StateId, Status>> {
-        let lent = self.borrow(head)?;
-        if pieces::fill(&lent.memory, values).is_err() {
+        let mut lent = self.borrow(head)?;
+        if lent.fill(values).is_err() {
             self.give_back(lent.number);
             return None;
         }
@@ -65,7 +81,7 @@ impl Transfers {
         if memory.is_none() {
             self.give_back(number);
         }
-        Some(LentMemory { number, n_state, memory: memory? })
+        Some(LentMemory { number, n_state, memory: memory?, mapped: None })
     }
 
     /// Tells the coordinator that memory is of no use here; when this returns it knows, unless the session is over.
