@@ -219,7 +219,7 @@ impl Forward for Bench {
         }
         let mut outputs = job.theta.clone();
         outputs[0] = f64::from(job.particle);
-        Ok(Prediction { outputs, state: vec![], cost: 0.0 })
+        Ok(Prediction { outputs, state: vec![].into(), cost: 0.0 })
     }
 }
 

@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 
 use starlings_models::{
     BuildSetup, Description, FilesDef, Forward, Job, ModelDef, Quantity, SOLVER, Setup, Signal, SolverDef,
-    Spec, Window,
+    Spec, StateValues, Window,
 };
 use starlings_solver::{SiteOptions, Solvers};
 
@@ -207,7 +207,7 @@ fn python(folder: &Path, figures: &mut Figures) -> Result<(), Failure> {
     figures.push(("Python: over the wire, ms", served));
     figures.push(("Python: overhead, ms (limit 1)", served - direct));
     let large = of("large")?;
-    let job = step(vec![20.0], 2, Some(vec![0.5; NUMBERS]));
+    let job = step(vec![20.0], 2, Some(vec![0.5; NUMBERS].into()));
     large.run(&job)?;
     let milliseconds = median(LARGE, || drop(large.run(&job)));
     let rate = 2.0 * 8.0 * NUMBERS as f64 / (milliseconds * 1e-3) / 1e9;
@@ -230,7 +230,7 @@ fn outside(native: &Setup, def: SolverDef) -> Result<Box<dyn Forward>, Failure> 
 }
 
 /// A window of one observation.
-fn step(theta: Vec<f64>, i: usize, state: Option<Vec<f64>>) -> Job {
+fn step(theta: Vec<f64>, i: usize, state: Option<StateValues>) -> Job {
     let (start, end) = (0.1 * (i as f64 - 1.0), 0.1 * i as f64);
     let window =
         Window::free(start, vec![end], 1, vec![Signal { times: vec![0.0, 1.0], values: vec![0.1, 0.1] }]);

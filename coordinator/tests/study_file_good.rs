@@ -8,7 +8,7 @@ use std::sync::Arc;
 use starlings_coordinator::study::Study;
 use starlings_estimators::{Drift, Points, Transform};
 use starlings_models::units::rounded;
-use starlings_models::{BuildSetup, Job, Window};
+use starlings_models::{BuildSetup, Job, StateValues, Window};
 
 /// Values above this stand only where nothing may be fitted.
 const SECRET: f64 = 1e6;
@@ -155,7 +155,7 @@ fn consecutive_windows_run_like_the_whole() {
     let study = aorta_study();
     let model = study.setup.build().unwrap();
     let theta = study.theta_for(0, &study.theta.iter().map(|t| t.prior_mean).collect::<Vec<_>>());
-    let run = |window: Arc<Window>, state: Option<Vec<f64>>| {
+    let run = |window: Arc<Window>, state: Option<StateValues>| {
         model.run(&Job { particle: 0, record: 0, window, theta: theta.clone(), state }).unwrap()
     };
     let whole = run(Arc::new(study.whole(0, true)), None);

@@ -148,11 +148,11 @@ fn a_memory_is_one_quantity_of_the_state_and_its_parts_recombine() {
     assert_eq!(model.spec(), &spec);
     let (first, second) = (free(&setup, 0.0, 3, 0.11), free(&setup, 0.33, 5, 0.09));
     let [a, b] = [1.0, 3.0].map(|x0| run(&*model, &first, &[x0]).state);
-    let go_on = |state: Vec<f64>| {
+    let go_on = |state: starlings_models::StateValues| {
         let job = starlings_models::Job { state: Some(state), ..job(&second, &[0.0]) };
         model.run(&job).unwrap().outputs
     };
-    let mean: Vec<f64> = a.iter().zip(&b).map(|(a, b)| 0.5 * (a + b)).collect();
+    let mean: starlings_models::StateValues = a.iter().zip(&b).map(|(a, b)| 0.5 * (a + b)).collect();
     let (of_mean, of_a, of_b) = (go_on(mean), go_on(a), go_on(b));
     let mean_of: Vec<f64> = of_a.iter().zip(&of_b).map(|(a, b)| 0.5 * (a + b)).collect();
     // The integrator's tolerance of 1e-8 per step, at other steps.

@@ -121,7 +121,7 @@ fn a_shift_that_does_not_change_during_a_run_gives_the_bits_of_the_shifted_param
         let mut x = vec![0.0; model.spec().n_state()];
         model.initial(&theta, &mut x);
         // Where a run starts follows from the plain parameter, so both start there.
-        let from = |theta: &[f64]| Job { state: Some(x.clone()), ..job(&window, theta) };
+        let from = |theta: &[f64]| Job { state: Some(x.clone().into()), ..job(&window, theta) };
         let mut shifted = theta.clone();
         shifted[at] += 1e-3 * shifted[at];
         let got = extended.build().unwrap().run(&from(&theta)).unwrap();

@@ -131,7 +131,7 @@ fn a_state_that_is_not_finite_is_named_before_anything_runs() {
         let spec = setup.spec().unwrap();
         let mut state = vec![1.0; spec.n_state()];
         state[spec.n_state() - 1] = f64::NAN;
-        let job = starlings_models::Job { state: Some(state), ..job(&window(&setup, 5), &theta) };
+        let job = starlings_models::Job { state: Some(state.into()), ..job(&window(&setup, 5), &theta) };
         let what = format!("state `{}`", Spec::component(&spec.states, spec.n_state() - 1));
         assert_eq!(
             setup.build().unwrap().run(&job),
@@ -261,6 +261,6 @@ fn a_job_that_does_not_fit_is_refused() {
     let mut unsorted = good.clone();
     unsorted.inputs[0].times.swap(3, 4);
     refused(&unsorted, &theta);
-    let short = starlings_models::Job { state: Some(vec![]), ..job(&good, &theta) };
+    let short = starlings_models::Job { state: Some(vec![].into()), ..job(&good, &theta) };
     assert!(matches!(model.run(&short), Err(ParticleError::BadJob(_))));
 }

@@ -72,7 +72,7 @@ fn final_error(kind: &str, gain: f64, n: usize) -> Vec<f64> {
     let truth = run(&*setup.build().unwrap(), &window, &THETA).state;
     setup.model.constants.insert("initial:x".to_owned(), 3.0);
     let state = run(&*setup.build().unwrap(), &window, &THETA).state;
-    state.iter().zip(truth).map(|(a, b)| a - b).collect()
+    state.iter().zip(&truth).map(|(a, b)| a - b).collect()
 }
 
 #[test]

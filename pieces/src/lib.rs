@@ -13,12 +13,14 @@ pub mod folder;
 pub mod mapped;
 pub mod memory;
 pub mod place;
+pub mod sealed;
 
 pub use error::PieceError;
 pub use folder::{Folder, Staged};
 pub use mapped::Mapped;
 pub use memory::SharedMemory;
 pub use place::PlaceName;
+pub use sealed::Sealed;
 
 /// Name of a piece: BLAKE3 of its bytes.
 pub type PieceName = [u8; 32];

@@ -59,7 +59,8 @@ impl Driven {
     /// # Errors
     /// Where the system gives none.
     pub fn new() -> io::Result<Self> {
-        let runtime = Builder::new_current_thread().enable_all().build()?;
+        let runtime =
+            Builder::new_current_thread().enable_all().on_thread_start(crate::batch::computes).build()?;
         let handle = runtime.handle().clone();
         Ok(Self {
             runtime: Mutex::new(Some(Arc::new(Owned(Some(runtime))))),

@@ -8,6 +8,7 @@
 
 pub mod access;
 pub mod adapters;
+pub mod batch;
 mod codec;
 pub mod convert;
 pub mod descriptors;

@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use starlings_models::{Forward, Job, ParticleError};
+use starlings_models::{Forward, Job, ParticleError, StateValues};
 use starlings_proto::{Lease, LeaseOutcome, SetupId, State, StateId, job_key};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::task::AbortHandle;
@@ -58,7 +58,7 @@ impl Inbox {
     ) {
         let named = if let Some(State::Named(id)) = &job.state { Some(*id) } else { None };
         let key = named.map(|_| job_key(&setup, &job));
-        let state = if let Some(State::Values(values)) = job.state { Some(values) } else { None };
+        let state = if let Some(State::Values(values)) = job.state { Some(values.into()) } else { None };
         let Job { particle, record, window, theta, .. } = job;
         let job = Job { particle, record, window, theta, state };
         match (named, key) {
@@ -75,7 +75,7 @@ impl Inbox {
         slots: &Slots,
         asked: Asked,
         id: StateId,
-        task: impl FnOnce(Asked, Vec<f64>, OwnedSemaphorePermit) -> Task + Send + 'static,
+        task: impl FnOnce(Asked, StateValues, OwnedSemaphorePermit) -> Task + Send + 'static,
     ) {
         let (slots, lease) = (slots.clone(), asked.lease);
         let (lanes, room, most) = (Arc::clone(&self.lanes), Arc::clone(&self.room), self.most);
@@ -118,7 +118,7 @@ async fn fetch(
     lanes: &Semaphore,
     most: u32,
     id: StateId,
-) -> Result<(Vec<f64>, OwnedSemaphorePermit), String> {
+) -> Result<(StateValues, OwnedSemaphorePermit), String> {
     let ends = |_| "this worker ends".to_owned();
     let _lane = lanes.acquire().await.map_err(ends)?;
     let incoming = transfers.ask(id).await?;

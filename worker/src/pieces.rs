@@ -1,8 +1,8 @@
 //! The pieces of a state: sent one after the other, or written into the shared folder or shared memory and read from there.
 
-use starlings_pieces::{Folder, PieceName, SharedMemory};
+use starlings_models::StateValues;
+use starlings_pieces::{Folder, PieceName, Sealed, SharedMemory};
 use starlings_proto::convert::floats;
-use starlings_proto::convert::lent::encode_in_memory;
 use starlings_proto::convert::piece_names::{NAMES, encode_names};
 use starlings_proto::convert::state::{CHUNK_BYTES, CHUNK_VALUES, PutHead, encode_chunk};
 use starlings_proto::generated::Chunk;
@@ -97,20 +97,28 @@ pub(crate) fn fill(
     pieces.try_for_each(|(index, values)| write(&floats::encode(values), index * CHUNK_BYTES))
 }
 
-/// Says that a state stands in the memory that was lent under this number.
-pub(crate) fn send_in_memory(pieces: &Sender<Chunk>, head: PutHead, number: u64) {
-    // A stream that ended is told by the answer.
-    let _ = pieces.blocking_send(head.encode()).and_then(|()| pieces.blocking_send(encode_in_memory(number)));
-}
-
-/// Reads a state of so many values from memory that nobody changes into memory of its own, whatever is in that.
-pub(crate) fn copy(memory: &SharedMemory, n_state: usize, mut values: Vec<f64>) -> std::io::Result<Vec<f64>> {
-    values.resize(n_state, 0.0);
+/// The values of a state that stands in memory which nobody changes: where it is, or a copy where that cannot be.
+pub(crate) fn seen(memory: &SharedMemory, n_state: usize) -> std::io::Result<StateValues> {
+    if cfg!(target_endian = "little")
+        && let Ok(sealed) = memory.see()
+    {
+        return Ok(StateValues::of(InPlace(sealed)));
+    }
+    let mut values = vec![0.0_f64; n_state];
     memory.read(bytemuck::cast_slice_mut(&mut values), 0)?;
     if cfg!(target_endian = "big") {
         for value in &mut values {
             *value = f64::from_bits(value.to_bits().swap_bytes());
         }
     }
-    Ok(values)
+    Ok(values.into())
+}
+
+/// Values that stand in memory of another process.
+struct InPlace(Sealed);
+
+impl AsRef<[f64]> for InPlace {
+    fn as_ref(&self) -> &[f64] {
+        bytemuck::cast_slice(self.0.bytes())
+    }
 }

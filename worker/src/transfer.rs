@@ -22,9 +22,10 @@ use starlings_proto::words::status_text;
 use starlings_proto::{Lease, StateId};
 use tokio::runtime::Handle;
 use tokio::sync::{Semaphore, mpsc, oneshot};
+use tokio_stream::Stream;
 use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::sync::CancellationToken;
-use tonic::{Status, Streaming};
+use tonic::{Response, Status, Streaming};
 
 pub(crate) use incoming::Incoming;
 
@@ -39,6 +40,9 @@ const LANES: usize = 2;
 
 /// Pieces made ahead of what the network has taken.
 const AHEAD: usize = 4;
+
+/// What the coordinator answers to a put.
+type PutAnswer = oneshot::Receiver<Result<Response<generated::PutResult>, Status>>;
 
 /// The way of states over one session. Every job of it holds one, small state or large: a clone costs a count.
 #[derive(Clone)]
@@ -168,7 +172,10 @@ impl Transfers {
 
     /// Puts what `send` says, which returns the name that the coordinator must answer with, if it is to be compared.
     fn send(&self, send: impl FnOnce(mpsc::Sender<generated::Chunk>) -> Sent) -> Result<StateId, String> {
-        let (taken, sent) = self.arrived(send).map_err(|status| status_text(&status))?;
+        let (pieces, outgoing) = mpsc::channel(AHEAD);
+        let answered = self.begin_put(ReceiverStream::new(outgoing));
+        let sent = send(pieces);
+        let taken = taken(answered).map_err(|status| status_text(&status))?;
         match sent {
             Sent::Unnamed => Ok(taken),
             Sent::Named(name) if name == taken => Ok(taken),
@@ -176,24 +183,14 @@ impl Transfers {
         }
     }
 
-    /// Puts what `send` says: the name of what arrived, and what `send` returned.
-    fn arrived<T>(
-        &self,
-        send: impl FnOnce(mpsc::Sender<generated::Chunk>) -> T,
-    ) -> Result<(StateId, T), Status> {
-        let (pieces, outgoing) = mpsc::channel(AHEAD);
+    /// Begins to put a state that these messages bring.
+    fn begin_put(&self, messages: impl Stream<Item = generated::Chunk> + Send + 'static) -> PutAnswer {
         let (mut client, lanes) = (self.client.clone(), Arc::clone(&self.lanes));
-        let answered = self.begin(async move {
+        self.begin(async move {
             // It is never closed.
             let _lane = lanes.acquire().await;
-            client.put(ReceiverStream::new(outgoing)).await
-        });
-        let sent = send(pieces);
-        let result =
-            answered.blocking_recv().map_err(|_| Status::unavailable("the connection is gone"))??;
-        let taken =
-            decode_put_result(result.get_ref()).map_err(|error| Status::internal(error.to_string()))?;
-        Ok((taken, sent))
+            client.put(messages).await
+        })
     }
 
     /// Begins a call; its answer does not come where the session ends before.
@@ -210,6 +207,12 @@ impl Transfers {
         });
         answered
     }
+}
+
+/// The name of a state that was put, once it has arrived. For a thread that may wait.
+fn taken(answered: PutAnswer) -> Result<StateId, Status> {
+    let result = answered.blocking_recv().map_err(|_| Status::unavailable("the connection is gone"))??;
+    decode_put_result(result.get_ref()).map_err(|error| Status::internal(error.to_string()))
 }
 
 async fn next(inbound: &mut Streaming<generated::Chunk>) -> Result<generated::Chunk, String> {

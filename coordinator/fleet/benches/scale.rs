@@ -11,7 +11,9 @@ use std::time::{Duration, Instant};
 
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use starlings_fleet::{Fleet, FleetConfig, FleetEvent, GrpcFleet, LocalConfig, LocalWorkers, SetupId};
-use starlings_models::{Forward, Job, ModelDef, ParticleError, Prediction, Setup, SetupError, Spec, Window};
+use starlings_models::{
+    Forward, Job, ModelDef, ParticleError, Prediction, Setup, SetupError, Spec, StateValues, Window,
+};
 use starlings_worker::WorkerConfig;
 use tokio_util::sync::CancellationToken;
 
@@ -184,7 +186,7 @@ impl Forward for Bench {
             _ => 0.0,
         };
         *ENDED.lock().unwrap_or_else(PoisonError::into_inner) = Some(Instant::now());
-        Ok(Prediction { outputs, state: vec![], cost: 0.0 })
+        Ok(Prediction { outputs, state: StateValues::default(), cost: 0.0 })
     }
 }
 

@@ -59,7 +59,7 @@ pub use travel::{returns, travels};
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-use starlings_models::{Failure, Job, Prediction, Setup};
+use starlings_models::{Failure, Job, Prediction, Setup, StateValues};
 
 /// How often outcomes are told of while their batch goes on.
 pub const TELL_EVERY: Duration = Duration::from_millis(500);
@@ -69,7 +69,7 @@ pub type Arrived<'a> = &'a mut dyn FnMut(Vec<(usize, Outcome<Held>)>) -> Control
 
 /// How one job of a batch ended. The state of its prediction is an `S`, as that of its job.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Outcome<S = Vec<f64>> {
+pub struct Outcome<S = StateValues> {
     /// The prediction, or why there is none: the model's doing, or the limit of wall time. A failure of a place is never here.
     pub result: Result<Prediction<S>, Failure>,
     /// How often the job was started; depends on the workers and must not enter an estimate.
@@ -121,9 +121,14 @@ pub trait Fleet {
     /// # Errors
     /// As [`Fleet::run_mixed`], and when a state cannot be kept or read.
     fn run_held(&mut self, jobs: Vec<(SetupId, Job<Held>)>) -> Result<Vec<Outcome<Held>>, FleetError> {
-        let jobs = jobs.into_iter().map(|(setup, job)| Ok((setup, job.try_map(Held::into_values)?)));
+        let jobs = jobs
+            .into_iter()
+            .map(|(setup, job)| Ok((setup, job.try_map(|state| state.into_values().map(Into::into))?)));
         let outcomes = self.run_mixed(jobs.collect::<Result<_, StateError>>()?)?;
-        outcomes.into_iter().map(|outcome| outcome.try_map(|values| Ok(Held::Values(values)))).collect()
+        outcomes
+            .into_iter()
+            .map(|outcome| outcome.try_map(|state| Ok(Held::Values(state.into_vec()))))
+            .collect()
     }
 
     /// As [`Fleet::run_held`], and tells of outcomes while the batch goes on: every [`TELL_EVERY`], also when there are none, of

@@ -137,14 +137,17 @@ pub(super) fn get(
     let by_names = get.names && hub.states().is_shared();
     let in_memory = get.descriptor != 0
         && state.descriptor().zip(way).is_some_and(|(memory, way)| way.send(get.descriptor, memory).is_ok());
+    if in_memory {
+        counted.went(8 * state.n_state());
+        // There is room for both, so that they go in one.
+        for message in [encode_head(state.n_state()), encode_in_memory(get.descriptor)] {
+            let _ = sender.try_send(Ok(message));
+        }
+        return Ok(ReceiverStream::new(pieces));
+    }
     let hub = Arc::clone(hub);
     tokio::spawn(async move {
         let mut given = sender.send(Ok(encode_head(state.n_state()))).await.is_ok();
-        if in_memory {
-            counted.went(8 * state.n_state());
-            let _ = sender.send(Ok(encode_in_memory(get.descriptor))).await;
-            return;
-        }
         if by_names {
             for names in state.pieces().chunks(NAMES) {
                 if sender.send(Ok(encode_names(names))).await.is_err() {

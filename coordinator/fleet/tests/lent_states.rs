@@ -22,7 +22,7 @@ fn worker_process() {
         "honest" => work(moved),
         "spoils" => work(|job| {
             let mut prediction = moved(job);
-            prediction.state[70_000] = f64::NAN;
+            prediction.state = (0..BYTES / 8).map(|i| if i == 70_000 { f64::NAN } else { 0.0 }).collect();
             prediction
         }),
         "narrow" => work(|job| {

@@ -70,7 +70,9 @@ fn a_worker_with_the_sign_of_one_output_turned_is_named_and_put_out() {
 
 #[test]
 fn a_worker_with_one_wrong_bit_in_a_state_is_named_and_put_out() {
-    assert_found_out(|job| changed(job, |p| p.state[0] = f64::from_bits(p.state[0].to_bits() ^ 1)));
+    assert_found_out(|job| {
+        changed(job, |p| p.state = p.state.iter().map(|x| f64::from_bits(x.to_bits() ^ 1)).collect())
+    });
 }
 
 #[test]
@@ -84,7 +86,7 @@ fn a_worker_with_values_that_are_none_or_too_few_or_too_many_changes_nothing() {
         |p| p.outputs[0] = f64::NAN,
         |p| p.outputs.truncate(1),
         |p| p.outputs.extend([0.0; 1000]),
-        |p| p.state[0] = f64::INFINITY,
+        |p| p.state = p.state.iter().map(|_| f64::INFINITY).collect(),
     ];
     for lie in lies {
         with_a_liar(
@@ -97,7 +99,7 @@ fn a_worker_with_values_that_are_none_or_too_few_or_too_many_changes_nothing() {
 #[test]
 fn a_worker_with_a_state_of_another_length_is_named_and_put_out() {
     // The length of a state is not known here, as of a model outside: only comparison tells.
-    assert_found_out(|job| changed(job, |p| p.state.push(1.0)));
+    assert_found_out(|job| changed(job, |p| p.state = p.state.iter().copied().chain([1.0]).collect()));
 }
 
 #[test]

@@ -21,7 +21,7 @@ fn gain(factor: f64) -> Setup {
 
 fn multiplied(job: &Job, factor: f64) -> Prediction {
     let outputs = job.theta.iter().map(|x| factor * x + f64::from(job.particle) / 3.0).collect();
-    Prediction { outputs, state: vec![factor], cost: 0.0 }
+    Prediction { outputs, state: vec![factor].into(), cost: 0.0 }
 }
 
 /// Multiplies by the setup's gain; a negative one cannot be built.
@@ -132,7 +132,7 @@ fn a_mixed_batch_gives_the_same_bits_on_threads_and_over_the_wire() {
         record: 0,
         window: Arc::clone(&windows[particle as usize % 2]),
         theta: vec![1.0, 0.1 + 0.01 * f64::from(particle), 3.0],
-        state: Some(vec![1.0, 0.0]),
+        state: Some(vec![1.0, 0.0].into()),
     };
     let run = |fleet: &mut dyn Fleet| {
         let ids = [&plain, &dragged].map(|setup| fleet.install(setup).unwrap());

@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use fleet_kit::hand::{Hand, block_on, hello};
-use fleet_kit::shared::{Own, Shared};
+use fleet_kit::shared::{N, Own, Shared};
 use fleet_kit::{ThreadWorker, await_workers, factory};
 use starlings_fleet::{Fleet, FleetError, FleetEvent, Folder, Held, hex};
 use starlings_models::{Job, Prediction, Setup, Window};
@@ -40,7 +40,7 @@ fn assert_runs(shared: &mut Shared) {
     let outcomes = shared.fleet.run_held(jobs.collect()).unwrap();
     for ((k, state), outcome) in (0..).zip(&states).zip(outcomes) {
         let values = state.values().unwrap();
-        let job = job(k, Held::Values(values)).try_map(Held::into_values).unwrap();
+        let job = job(k, Held::Values(values)).map(|state| state.into_values().unwrap().into());
         let ended = outcome.result.unwrap().state;
         assert!(matches!(&ended, Held::Stored(_)));
         assert!(ended.into_values().unwrap() == moved(&job).state, "particle {k}");
@@ -267,7 +267,7 @@ fn a_run_that_ends_in_a_state_which_is_not_finite_is_the_workers_fault_in_the_fo
     let mut shared = Shared::new();
     let spoiled = factory(|job| {
         let mut prediction = moved(job);
-        prediction.state[70_000] = f64::NAN;
+        prediction.state = (0..N).map(|i| if i == 70_000 { f64::NAN } else { 0.0 }).collect();
         Ok(prediction)
     });
     let _bad = shared.worker(spoiled);

@@ -51,7 +51,7 @@ fn states_in_the_store_go_from_batch_to_batch_without_their_values() {
     let setup = fleet.install(&Setup::default()).unwrap();
     let mut now = jobs(6);
     let mut held: Vec<Job<Held>> =
-        now.iter().cloned().map(|job| job.try_map(|x| Ok::<_, ()>(x.into())).unwrap()).collect();
+        now.iter().cloned().map(|job| job.map(|x| Held::Values(x.into_vec()))).collect();
     for _ in 0..3 {
         let outcomes = fleet.run_held(held.iter().map(|job| (setup, job.clone())).collect()).unwrap();
         for ((job, held), outcome) in now.iter_mut().zip(&mut held).zip(outcomes) {
@@ -119,7 +119,7 @@ fn a_run_that_ends_in_a_large_state_which_is_not_finite_is_the_workers_fault() {
     let address = fleet.address().unwrap();
     let spoiled = factory(|job| {
         let mut prediction = moved(job);
-        prediction.state[70_000] = f64::NAN;
+        prediction.state = (0..BYTES / 8).map(|i| if i == 70_000 { f64::NAN } else { 0.0 }).collect();
         Ok(prediction)
     });
     let _bad = ThreadWorker::start(address, spoiled);

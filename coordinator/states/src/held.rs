@@ -28,7 +28,7 @@ impl From<Vec<f64>> for Held {
 impl InKey for Held {
     fn in_key(&self) -> [u8; 32] {
         match self {
-            Self::Values(values) => values.in_key(),
+            Self::Values(values) => values.as_slice().in_key(),
             Self::Stored(state) => state.id(),
         }
     }

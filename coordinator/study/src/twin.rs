@@ -159,7 +159,7 @@ pub fn beats(
         if last(number, &recording) {
             return Ok(recording);
         }
-        state = found.state;
+        state = found.state.into_vec();
     }
     unreachable!("numbers do not end")
 }

@@ -119,10 +119,10 @@ impl Solve for Inside {
             record: run.record,
             window: Arc::new(run.window.clone()),
             theta,
-            state: run.state.map(<[f64]>::to_vec),
+            state: run.state.map(|state| state.to_vec().into()),
         };
         let prediction = setup.build().map_err(broken)?.run(&job)?;
-        let state = if self.description.spec.restart { prediction.state } else { Vec::new() };
+        let state = if self.description.spec.restart { prediction.state.into_vec() } else { Vec::new() };
         let shown = |value: f64| match self.decimals {
             Some(decimals) => (value * 10.0_f64.powi(decimals)).round() / 10.0_f64.powi(decimals),
             None => value,

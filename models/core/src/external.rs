@@ -23,7 +23,8 @@ use crate::setup::Setup;
 use crate::simulator::free_names;
 use crate::solver::Description;
 use crate::{
-    Forward, Job, ModelFailure, ObserverDef, ParticleError, Prediction, Signal, Spec, Stop, Until, Window,
+    Forward, Job, ModelFailure, ObserverDef, ParticleError, Prediction, Signal, Spec, StateValues, Stop,
+    Until, Window,
 };
 use applied::Applied;
 pub use outline::{check_effects, outline};
@@ -37,7 +38,7 @@ pub use run::Run;
 pub struct Solved {
     /// Predicted outputs, laid out as [`Window::observed`].
     pub outputs: Vec<f64>,
-    /// State at the last time, after the observer's correction; empty from a program that cannot restart.
+    /// StateValues at the last time, after the observer's correction; empty from a program that cannot restart.
     pub state: Vec<f64>,
 }
 
@@ -122,7 +123,7 @@ impl<S: Solve> External<S> {
                 values: shown.outputs.iter().skip(i).step_by(n).copied().collect(),
             };
             seen.inputs = (0..n).map(signal).collect();
-            of_effects.inputs = Some(shown.state);
+            of_effects.inputs = Some(shown.state.into_vec());
         }
         Ok(seen)
     }
@@ -148,7 +149,7 @@ impl<S: Solve> External<S> {
         let inputs = window.inputs.iter().cloned().chain(recorded).collect();
         let replayed = Window::free(window.start, window.times.clone(), n, inputs);
         let shown = effects.run(theta, replayed, of_effects.outputs.take())?;
-        of_effects.outputs = Some(shown.state);
+        of_effects.outputs = Some(shown.state.into_vec());
         of_effects.last = outputs.len().checked_sub(n).map(|first| outputs[first..].to_vec());
         Ok(shown.outputs)
     }
@@ -273,7 +274,8 @@ impl<S: Solve> Forward for External<S> {
         self.check(&solved, &window)?;
         let shown = self.add_to_outputs(job, &theta, solved.outputs, &mut of_effects)?;
         let outputs = self.rows.picked(&shown);
-        let state = if self.spec.restart { of_effects.after(solved.state) } else { Vec::new() };
+        let state =
+            if self.spec.restart { of_effects.after(solved.state).into() } else { StateValues::default() };
         Ok(Prediction { outputs, state, cost: 0.0 })
     }
 }

@@ -5,7 +5,7 @@
 
 use std::sync::Arc;
 
-use crate::{ParticleError, Spec, Until};
+use crate::{ParticleError, Spec, StateValues, Until};
 
 /// A sampled signal, linear between its samples and constant beyond them.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,7 +47,7 @@ impl Window {
 ///
 /// A model gets the values of the state; on its way to a worker a large state may stand as something else, `S`.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Job<S = Vec<f64>> {
+pub struct Job<S = StateValues> {
     /// Index of the sigma point.
     pub particle: u32,
     /// Index of the record in the study.
@@ -56,7 +56,7 @@ pub struct Job<S = Vec<f64>> {
     pub window: Arc<Window>,
     /// Parameter values in physical units, in the order of [`crate::Setup::parameters`].
     pub theta: Vec<f64>,
-    /// State at `window.start`; `None` starts from the model's initial state.
+    /// StateValues at `window.start`; `None` starts from the model's initial state.
     pub state: Option<S>,
 }
 
@@ -79,10 +79,10 @@ impl<S> Job<S> {
 
 /// What a run predicts. Its state is an `S` as that of a [`Job`].
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Prediction<S = Vec<f64>> {
+pub struct Prediction<S = StateValues> {
     /// Predicted outputs, `n_obs × n_times`, laid out as [`Window::observed`]; recorded before any correction.
     pub outputs: Vec<f64>,
-    /// State at the window's end, after the observer's correction.
+    /// StateValues at the window's end, after the observer's correction.
     pub state: S,
     /// Wall time of the run in seconds, measured by the worker; zero from a bare model, which knows no clock.
     pub cost: f64,

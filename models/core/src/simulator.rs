@@ -92,7 +92,7 @@ impl Simulator {
                 return Err(bad(format!("{} state values for a model of {n}", x.len())));
             }
             self.check_finite(window.start, &[], x, &[])?;
-            let mut x = x.clone();
+            let mut x = x.to_vec();
             let past = Past::resumed(model, window, &mut x);
             return Ok((x, past));
         }
@@ -197,7 +197,7 @@ impl Simulator {
         // An observer moves the state after the last check.
         self.check_finite(previous, &[], &x, &[])?;
         x.truncate(self.n_state);
-        Ok(Prediction { outputs, state: x, cost: 0.0 })
+        Ok(Prediction { outputs, state: x.into(), cost: 0.0 })
     }
 
     fn late(&self) -> Timeout {

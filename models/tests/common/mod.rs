@@ -84,7 +84,7 @@ pub(crate) fn run(model: &dyn Forward, window: &Window, theta: &[f64]) -> Predic
 /// Runs the window in pieces of `every` observation times, each from the state that the one before left.
 pub(crate) fn run_in_pieces(model: &dyn Forward, window: &Window, theta: &[f64], every: usize) -> Prediction {
     let n_obs = window.observed.len() / window.times.len();
-    let mut whole = Prediction::<Vec<f64>>::default();
+    let mut whole: Prediction = Prediction::default();
     let (mut start, mut state) = (window.start, None);
     // What an observer must know of the pieces before.
     let mut since = vec![window.start; n_obs];

@@ -97,6 +97,7 @@ impl Bench {
     ) -> Result<Vec<f64>, ParticleError> {
         let names: Vec<&str> = setup.effects.iter().map(|effect| effect.name.as_str()).collect();
         let model = setup.build().unwrap_or_else(|e| panic!("{}, {names:?}: {e}", self.name));
+        let state = state.map(Into::into);
         model.run(&Job { state, ..common::job(&self.window, theta) }).map(|prediction| prediction.outputs)
     }
 

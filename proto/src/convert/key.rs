@@ -8,7 +8,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use starlings_models::{Job, Window};
+use starlings_models::{Job, StateValues, Window};
 
 use super::state::{self, StateId};
 use super::{SetupId, State, floats, window, windows};
@@ -23,16 +23,22 @@ pub trait InKey {
     fn in_key(&self) -> [u8; 32];
 }
 
-impl InKey for Vec<f64> {
+impl InKey for [f64] {
     fn in_key(&self) -> [u8; 32] {
         if self.len() * 8 > MAX_INLINE_STATE { state::name(self) } else { hash(self) }
+    }
+}
+
+impl InKey for StateValues {
+    fn in_key(&self) -> [u8; 32] {
+        (**self).in_key()
     }
 }
 
 impl InKey for State {
     fn in_key(&self) -> [u8; 32] {
         match self {
-            Self::Values(values) => values.in_key(),
+            Self::Values(values) => values.as_slice().in_key(),
             Self::Named(id) => *id,
         }
     }
@@ -86,7 +92,13 @@ mod tests {
     fn job() -> Job {
         let inputs = vec![Signal { times: vec![0.0, 1.0], values: vec![2.0, 3.0] }];
         let window = Window::free(0.0, vec![1.0], 1, inputs);
-        Job { particle: 1, record: 2, window: window.into(), theta: vec![0.5, -0.0], state: Some(vec![1.0]) }
+        Job {
+            particle: 1,
+            record: 2,
+            window: window.into(),
+            theta: vec![0.5, -0.0],
+            state: Some(vec![1.0].into()),
+        }
     }
 
     #[test]
@@ -106,8 +118,8 @@ mod tests {
             with(&|job| job.theta[1] = 0.0),
             with(&|job| job.theta.truncate(1)),
             with(&|job| job.state = None),
-            with(&|job| job.state = Some(Vec::new())),
-            with(&|job| job.state = Some(vec![1.5])),
+            with(&|job| job.state = Some(StateValues::default())),
+            with(&|job| job.state = Some(vec![1.5].into())),
             over(&|window| window.start = -1.0),
             over(&|window| window.times[0] = 2.0),
             over(&|window| window.observed[0] = 0.0),
@@ -132,7 +144,7 @@ mod tests {
             values
         };
         let key = |state: State| job_key(&[7; 32], &job().try_map(|_| Ok::<_, ()>(state)).unwrap());
-        let of_values = job_key(&[7; 32], &Job { state: Some(large(1.0)), ..job() });
+        let of_values = job_key(&[7; 32], &Job { state: Some(large(1.0).into()), ..job() });
         assert_eq!(key(State::Values(large(1.0))), of_values);
         assert_eq!(key(State::Named(state::name(&large(1.0)))), of_values);
         assert_ne!(key(State::Named(state::name(&large(2.0)))), of_values);

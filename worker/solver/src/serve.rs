@@ -86,10 +86,10 @@ impl Served {
             record: request.record,
             window: Arc::new(request.window),
             theta,
-            state: request.state,
+            state: request.state.map(Into::into),
         };
         let prediction = forward.run(&job)?;
-        Ok(Solved { outputs: prediction.outputs, state: prediction.state })
+        Ok(Solved { outputs: prediction.outputs, state: prediction.state.into_vec() })
     }
 }
 

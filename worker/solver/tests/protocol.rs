@@ -67,7 +67,13 @@ fn job(theta: &[f64], from: usize, to: usize, state: Option<Vec<f64>>) -> Job {
         2,
         vec![Signal { times: (0..81).map(time).collect(), values: drive }],
     );
-    Job { particle: 3, record: 0, window: Arc::new(window), theta: theta.to_vec(), state }
+    Job {
+        particle: 3,
+        record: 0,
+        window: Arc::new(window),
+        theta: theta.to_vec(),
+        state: state.map(Into::into),
+    }
 }
 
 fn bits(values: &[f64]) -> Vec<u64> {
@@ -100,7 +106,7 @@ fn a_model_behind_the_wire_gives_the_same_bits_also_from_a_state() {
     assert_eq!(bits(&whole.0.outputs), bits(&whole.1.outputs));
     assert_eq!(bits(&whole.0.state), bits(&whole.1.state));
     let half = outside.run(&job(&theta, 0, 20, None)).unwrap();
-    let rest = outside.run(&job(&theta, 20, 40, Some(half.state))).unwrap();
+    let rest = outside.run(&job(&theta, 20, 40, Some(half.state.into_vec()))).unwrap();
     // The integrator of the whole run meets the same grid of inputs.
     assert!(apart(&rest.outputs, &whole.1.outputs[40..]) < 1e-9);
 }
@@ -145,7 +151,7 @@ fn an_effect_with_a_memory_goes_on_from_window_to_window() {
     for i in 0..40 {
         let part = outside.run(&job(&theta, i, i + 1, state)).unwrap();
         outputs.extend(part.outputs);
-        state = Some(part.state);
+        state = Some(part.state.into_vec());
     }
     // Between two observations the signal that the lag sees is a line: an error of the order of the sampling squared.
     let plain = native.run(&job(&[30.0, 0.7, 0.2, 0.0], 0, 40, None)).unwrap();

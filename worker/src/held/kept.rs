@@ -67,7 +67,7 @@ impl Kept {
     pub(super) fn bytes(&self) -> usize {
         let of_job = match &self.of {
             Of::Key(_) => 0,
-            Of::Job(_, job) => 8 * (job.theta.len() + job.state.as_ref().map_or(0, Vec::len)),
+            Of::Job(_, job) => 8 * (job.theta.len() + job.state.as_ref().map_or(0, |state| state.len())),
         };
         let of_result = match &self.ended {
             Ended::Inside(bytes) => bytes.len(),

@@ -5,9 +5,9 @@
 use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Read, Seek, Write};
 use std::path::Path;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use starlings_models::{ParticleError, Prediction};
+use starlings_models::{ParticleError, Prediction, StateValues};
 use starlings_proto::{Lease, State};
 
 use crate::transfer::Transfers;
@@ -22,14 +22,14 @@ pub(crate) struct Large {
 
 /// Where the values of a state are.
 enum Place {
-    Memory(Arc<Vec<f64>>),
+    Memory(StateValues),
     Disk(File),
 }
 
 impl Large {
     pub(crate) fn new(prediction: Prediction) -> Self {
         let Prediction { outputs, state, cost } = prediction;
-        Self { outputs, cost, n_state: state.len(), state: Mutex::new(Place::Memory(Arc::new(state))) }
+        Self { outputs, cost, n_state: state.len(), state: Mutex::new(Place::Memory(state)) }
     }
 
     /// Bytes of its state in memory, and in a file.
@@ -45,7 +45,7 @@ impl Large {
         let mut place = self.place();
         if let Place::Memory(values) = &*place {
             let mut file = BufWriter::new(tempfile::tempfile_in(scratch)?);
-            for value in values.iter() {
+            for value in values {
                 file.write_all(&value.to_le_bytes())?;
             }
             *place = Place::Disk(file.into_inner().map_err(io::IntoInnerError::into_error)?);
@@ -76,14 +76,14 @@ impl Large {
     /// The memory of its state.
     pub(crate) fn into_memory(self) -> Option<Vec<f64>> {
         match self.state.into_inner().unwrap_or_else(PoisonError::into_inner) {
-            Place::Memory(values) => Arc::into_inner(values),
+            Place::Memory(values) => values.into_own(),
             Place::Disk(_) => None,
         }
     }
 
-    fn values(&self) -> io::Result<Arc<Vec<f64>>> {
+    fn values(&self) -> io::Result<StateValues> {
         match &mut *self.place() {
-            Place::Memory(values) => Ok(Arc::clone(values)),
+            Place::Memory(values) => Ok(values.clone()),
             Place::Disk(file) => {
                 file.rewind()?;
                 let (mut file, mut word) = (BufReader::new(file), [0; 8]);
@@ -92,7 +92,7 @@ impl Large {
                     file.read_exact(&mut word)?;
                     values.push(f64::from_le_bytes(word));
                 }
-                Ok(Arc::new(values))
+                Ok(values.into())
             }
         }
     }
@@ -109,7 +109,7 @@ mod tests {
     #[test]
     fn a_state_on_disk_has_the_bits_that_it_had_in_memory() {
         let state = vec![1.0, -0.0, f64::MIN_POSITIVE / 2.0];
-        let large = Large::new(Prediction { outputs: vec![2.0], state: state.clone(), cost: 0.5 });
+        let large = Large::new(Prediction { outputs: vec![2.0], state: state.clone().into(), cost: 0.5 });
         assert_eq!(large.bytes(), (24, 0));
         large.spill(&std::env::temp_dir()).unwrap();
         assert_eq!(large.bytes(), (0, 24));

@@ -24,7 +24,7 @@ fn keep(held: &Held, particle: u32) -> bool {
 }
 
 fn large(n: u8) -> Arc<Large> {
-    let prediction = Prediction { outputs: vec![1.0], state: vec![f64::from(n); 1000], cost: 0.5 };
+    let prediction = Prediction { outputs: vec![1.0], state: vec![f64::from(n); 1000].into(), cost: 0.5 };
     Arc::new(Large::new(prediction))
 }
 

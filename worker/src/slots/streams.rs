@@ -84,7 +84,7 @@ impl Shared {
             }
             Ok(prediction) => {
                 let Prediction { outputs, state, cost: own } = prediction;
-                let prediction = Prediction { outputs, state: State::Values(state), cost: own };
+                let prediction = Prediction { outputs, state: State::Values(state.into_vec()), cost: own };
                 self.ended_small(&task, Ok(prediction), cost);
             }
             Err(error) => self.ended_small(&task, Err(error), cost),

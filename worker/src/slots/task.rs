@@ -80,10 +80,10 @@ impl Task {
         self.key.is_some()
     }
 
-    /// The large state that it began from, unless somebody has the task too.
+    /// The memory of the large state that it began from, unless somebody has it too.
     pub(super) fn into_large_state(self: Arc<Self>) -> Option<Vec<f64>> {
         let task = Arc::into_inner(self).filter(|task| task.key.is_some())?;
-        Arc::into_inner(task.job)?.state
+        Arc::into_inner(task.job)?.state?.into_own()
     }
 
     /// It waits no more: its place among those that do is free.

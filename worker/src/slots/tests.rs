@@ -55,7 +55,7 @@ impl Forward for Stubborn {
         until: &Until<'_>,
     ) -> Result<starlings_models::Prediction, ParticleError> {
         let _ = Endless.run_within(job, until);
-        Ok(starlings_models::Prediction { outputs: vec![1.0], state: vec![], cost: 0.0 })
+        Ok(starlings_models::Prediction { outputs: vec![1.0], state: vec![].into(), cost: 0.0 })
     }
 }
 

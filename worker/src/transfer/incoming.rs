@@ -2,6 +2,7 @@
 //!
 //! Next file to read: [`super`].
 
+use starlings_models::StateValues;
 use starlings_pieces::SharedMemory;
 use starlings_proto::convert::lent::decode_in_memory;
 use starlings_proto::convert::piece_names::decode_names;
@@ -26,7 +27,7 @@ pub(crate) struct Incoming {
 
 impl Incoming {
     /// Its values.
-    pub(crate) async fn read(mut self) -> Result<Vec<f64>, String> {
+    pub(crate) async fn read(mut self) -> Result<StateValues, String> {
         let first = next(&mut self.inbound).await?;
         if decode_in_memory(&first).map_err(|error| wrong(&error))?.is_some() {
             return self.in_memory().await;
@@ -40,7 +41,7 @@ impl Incoming {
         let n_state = self.n_state;
         let read = tokio::task::spawn_blocking(move || pieces::read(&folder, &names, n_state, values));
         match read.await.map_err(|_| wrong(&"its thread ended"))? {
-            Ok(values) => Ok(values),
+            Ok(values) => Ok(values.into()),
             // The coordinator finds out whether it can read what this worker cannot, or says which file is missing.
             Err(reason) => {
                 self.way.refused(&reason);
@@ -50,13 +51,13 @@ impl Incoming {
     }
 
     /// Asks for it again, to come piece by piece over the connection.
-    async fn in_pieces(mut self) -> Result<Vec<f64>, String> {
+    async fn in_pieces(mut self) -> Result<StateValues, String> {
         (self.n_state, self.inbound) = self.way.open(self.state, false, 0).await?;
         self.whole(None).await
     }
 
     /// Its values, which stand in memory that the coordinator sees too.
-    async fn in_memory(mut self) -> Result<Vec<f64>, String> {
+    async fn in_memory(mut self) -> Result<StateValues, String> {
         let Some(asked) = self.asked.take() else {
             return Err(wrong(&"it is in memory whose descriptor was not asked for"));
         };
@@ -64,15 +65,15 @@ impl Incoming {
             // It was lost on its way, as where this process has all descriptors that it may have.
             return self.in_pieces().await;
         };
-        let (n_state, values) = (self.n_state, self.room()?);
+        let n_state = self.n_state;
         let is_compared = self.way.compared.comes();
-        let read = tokio::task::spawn_blocking(move || {
+        let seen = tokio::task::spawn_blocking(move || {
             let memory = SharedMemory::received(descriptor, n_state * 8, true)?;
-            let values = pieces::copy(&memory, n_state, values)?;
+            let values = pieces::seen(&memory, n_state)?;
             Ok((is_compared.then(|| name(&values)), values))
         });
-        let read = read.await.map_err(|_| wrong(&"its thread ended"))?;
-        match read.map_err(|error: std::io::Error| wrong(&error))? {
+        let seen = seen.await.map_err(|_| wrong(&"its thread ended"))?;
+        match seen.map_err(|error: std::io::Error| wrong(&error))? {
             (Some(name), _) if name != self.state => Err(wrong(&"its values are not those of its name")),
             (_, values) => Ok(values),
         }
@@ -113,7 +114,7 @@ impl Incoming {
     }
 
     /// Its values, piece by piece over the connection.
-    async fn whole(mut self, mut first: Option<generated::Chunk>) -> Result<Vec<f64>, String> {
+    async fn whole(mut self, mut first: Option<generated::Chunk>) -> Result<StateValues, String> {
         let n_state = self.n_state;
         let mut values = self.room()?;
         values.clear();
@@ -130,7 +131,7 @@ impl Incoming {
             values.extend(bytes.as_chunks::<8>().0.iter().map(|word| f64::from_le_bytes(*word)));
         }
         if naming.is_none_or(|naming| naming.finish() == self.state) {
-            Ok(values)
+            Ok(values.into())
         } else {
             Err(wrong(&"its values are not those of its name"))
         }

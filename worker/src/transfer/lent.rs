@@ -6,11 +6,11 @@ use std::sync::{MutexGuard, PoisonError};
 
 use starlings_pieces::{Mapped, SharedMemory};
 use starlings_proto::StateId;
-use starlings_proto::convert::lent::{GiveBack, Lend, NOT_LENT};
+use starlings_proto::convert::lent::{GiveBack, Lend, NOT_LENT, encode_in_memory};
 use starlings_proto::convert::state::PutHead;
 use tonic::Status;
 
-use super::Transfers;
+use super::{Transfers, taken};
 use crate::pieces;
 
 /// Memory for states of one length.
@@ -26,14 +26,12 @@ pub(super) struct LentMemory {
 impl LentMemory {
     /// Writes a state into it.
     fn fill(&mut self, values: &[f64]) -> std::io::Result<()> {
-        match &self.mapped {
-            Some(mapped) => pieces::fill(values, |bytes, at| mapped.write(bytes, at)),
-            None => {
-                pieces::fill(values, |bytes, at| self.memory.write(bytes, at))?;
-                self.mapped = self.memory.map().ok();
-                Ok(())
-            }
+        if let Some(mapped) = &self.mapped {
+            return pieces::fill(values, |bytes, at| mapped.write(bytes, at));
         }
+        pieces::fill(values, |bytes, at| self.memory.write(bytes, at))?;
+        self.mapped = self.memory.map().ok();
+        Ok(())
     }
 }
 
@@ -46,8 +44,9 @@ impl Transfers {
             return None;
         }
         // Its name is made of what stands there, by the coordinator alone.
-        match self.arrived(|pieces| pieces::send_in_memory(&pieces, head, lent.number)) {
-            Ok((state, ())) => {
+        let messages = [head.encode(), encode_in_memory(lent.number)];
+        match taken(self.begin_put(tokio_stream::iter(messages))) {
+            Ok(state) => {
                 self.lock_lent().push(lent);
                 Some(Ok(state))
             }

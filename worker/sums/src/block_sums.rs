@@ -229,7 +229,7 @@ impl Forward for BlockSums {
             _ => return bad(format!("block sums need 2, 3 or 5 numbers, got {}", job.theta.len())),
         };
         match answer {
-            Ok(state) => Ok(Prediction { outputs: Vec::new(), state, cost: 0.0 }),
+            Ok(state) => Ok(Prediction { outputs: Vec::new(), state: state.into(), cost: 0.0 }),
             Err(error) => Err(ModelFailure::OutsideDomain(error.to_string()).into()),
         }
     }

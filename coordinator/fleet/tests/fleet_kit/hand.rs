@@ -2,7 +2,7 @@
 
 use std::net::SocketAddr;
 
-use starlings_models::Prediction;
+use starlings_models::{Prediction, StateValues};
 use starlings_proto::generated::{self, fleet_client::FleetClient};
 use starlings_proto::{
     FromWorker, Hello, Lease, LeaseOutcome, PROTOCOL, ReceivedWindows, State, ToWorker, VERSION,
@@ -75,12 +75,12 @@ impl Hand {
 
 /// The exact answer to a job, as it travels.
 pub fn squared(job: &starlings_models::Job) -> Prediction<State> {
-    square(job).try_map(|values| Ok::<_, ()>(State::from(values))).unwrap()
+    square(job).try_map(|values| Ok::<_, ()>(State::from(values.into_vec()))).unwrap()
 }
 
 /// A state that came inside its job.
-pub fn inside(state: State) -> Result<Vec<f64>, State> {
-    if let State::Values(values) = state { Ok(values) } else { Err(state) }
+pub fn inside(state: State) -> Result<StateValues, State> {
+    if let State::Values(values) = state { Ok(values.into()) } else { Err(state) }
 }
 
 pub fn hello() -> Hello {

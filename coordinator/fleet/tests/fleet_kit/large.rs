@@ -29,7 +29,7 @@ pub fn job(particle: u32, n_observed: usize) -> Job {
     let window = Window::free(0.0, vec![1.0], n_observed, vec![]);
     let mut state: Vec<f64> = (0..N).map(|i| ((i * 31 + particle as usize) % 1009) as f64 / 7.0).collect();
     (state[1], state[2]) = (-0.0, f64::MIN_POSITIVE / 4.0);
-    Job { particle, record: 0, window: Arc::new(window), theta: vec![], state: Some(state) }
+    Job { particle, record: 0, window: Arc::new(window), theta: vec![], state: Some(state.into()) }
 }
 
 /// Asserts that each outcome is, to the last bit, that of the job of its place.

@@ -69,7 +69,7 @@ pub fn jobs(n: u32) -> Vec<Job> {
         record: 0,
         window: Arc::clone(&window),
         theta: vec![0.1 * f64::from(particle), 0.7],
-        state: Some(vec![f64::from(particle)]),
+        state: Some(vec![f64::from(particle)].into()),
     };
     (0..n).map(job).collect()
 }

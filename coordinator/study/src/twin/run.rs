@@ -34,13 +34,13 @@ impl Run<'_> {
         window: &Arc<Window>,
         state: Option<Vec<f64>>,
     ) -> Result<Prediction, ParticleError> {
-        let (window, theta) = (Arc::clone(window), self.theta.clone());
+        let (window, theta, state) = (Arc::clone(window), self.theta.clone(), state.map(Into::into));
         self.model.run(&Job { particle: 0, record: self.record as u32, window, theta, state })
     }
 
     /// The initial state: what a run of no length ends with.
     pub(super) fn initial(&self, window: &Window) -> Result<Vec<f64>, ParticleError> {
-        Ok(self.predict(&self.part(window, window.start, vec![window.start]), None)?.state)
+        Ok(self.predict(&self.part(window, window.start, vec![window.start]), None)?.state.into_vec())
     }
 
     /// The periodic state; inputs are made to go on periodically to the window's end.
@@ -59,7 +59,7 @@ impl Run<'_> {
         let times = within(&window.times, window.start, end);
         let size = self.sizes(window, &times, start.clone())?;
         let whole = self.part(window, window.start, times);
-        let mut once = |x: &[f64]| Ok(self.predict(&whole, Some(x.to_vec()))?.state);
+        let mut once = |x: &[f64]| Ok(self.predict(&whole, Some(x.to_vec()))?.state.into_vec());
         let found = fixed_point(&mut once, start, &size).map_err(|refused| match refused {
             NotPeriodic::Model(error) => TwinError::Model(error),
             NotPeriodic::StillMoving { n_period, change } => TwinError::Request(format!(
@@ -77,7 +77,7 @@ impl Run<'_> {
         let mut from = window.start;
         for times in times.chunks(times.len().div_ceil(PARTS)) {
             states.push(x.clone());
-            x = self.predict(&self.part(window, from, times.to_vec()), Some(x))?.state;
+            x = self.predict(&self.part(window, from, times.to_vec()), Some(x))?.state.into_vec();
             from = times.last().copied().unwrap_or(from);
         }
         states.push(x);

@@ -11,7 +11,8 @@ use crate::SetupError;
 use crate::effect::Extended;
 use crate::setup::Setup;
 use crate::{
-    EffectDef, Forward, Job, Model, NativeModels, ParticleError, Prediction, Simulator, Spec, Window,
+    EffectDef, Forward, Job, Model, NativeModels, ParticleError, Prediction, Simulator, Spec, StateValues,
+    Window,
 };
 
 /// Effects on signals, ready to run.
@@ -64,7 +65,13 @@ impl Applied {
         state: Option<Vec<f64>>,
     ) -> Result<Prediction, ParticleError> {
         let theta = self.places.iter().map(|i| theta[*i]).collect();
-        self.simulator.run(&Job { particle: 0, record: 0, window: Arc::new(window), theta, state })
+        self.simulator.run(&Job {
+            particle: 0,
+            record: 0,
+            window: Arc::new(window),
+            theta,
+            state: state.map(StateValues::from),
+        })
     }
 }
 

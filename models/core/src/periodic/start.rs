@@ -44,19 +44,21 @@ impl PeriodicStart {
     /// The state at the window's start that a period leads back to.
     fn state(&self, job: &Job, period: f64, until: &Until<'_>) -> Result<Vec<f64>, ParticleError> {
         let start = job.window.start;
-        let run = |from: f64, to: f64, state: Option<Vec<f64>>| {
+        let run = |from: f64, to: f64, state: Option<&[f64]>| {
             let window = Arc::new(Window::free(from, vec![to], self.n_row, job.window.inputs.clone()));
-            self.inner.run_within(&Job { window, state, ..job.clone() }, until).map(|found| found.state)
+            let state = state.map(|x| x.to_vec().into());
+            let found = self.inner.run_within(&Job { window, state, ..job.clone() }, until)?;
+            Ok(found.state.into_vec())
         };
         let mut states = vec![run(start, start, None)?];
         for part in 1..=PARTS {
             let [from, to] = [part - 1, part].map(|k| start + period * f64::from(k) / f64::from(PARTS));
-            let state = run(from, to, states.last().cloned())?;
+            let state = run(from, to, states.last().map(Vec::as_slice))?;
             states.push(state);
         }
         let size = sizes(self.inner.spec(), &states);
         let first = states.pop().unwrap_or_default();
-        let mut once = |x: &[f64]| run(start, start + period, Some(x.to_vec()));
+        let mut once = |x: &[f64]| run(start, start + period, Some(x));
         match fixed_point(&mut once, first, &size) {
             Ok(Periodic { state, .. }) => Ok(state),
             Err(NotPeriodic::Model(error)) => Err(error),
@@ -84,7 +86,7 @@ impl Forward for PeriodicStart {
         let Some(period) = self.periods.get(job.record as usize) else {
             return Err(ParticleError::BadJob(format!("record {} has no period", job.record)));
         };
-        let state = Some(self.state(job, *period, until)?);
+        let state = Some(self.state(job, *period, until)?.into());
         self.inner.run_within(&Job { state, ..job.clone() }, until)
     }
 }

@@ -55,9 +55,15 @@ impl Motor {
             n_obs,
             vec![Signal { times: vec![0.0, 1.0], values: vec![1.0, 0.8] }; n_input],
         );
-        let job = Job { particle: 0, record: 0, window: Arc::new(window), theta: vec![], state };
+        let job = Job {
+            particle: 0,
+            record: 0,
+            window: Arc::new(window),
+            theta: vec![],
+            state: state.map(Into::into),
+        };
         let ran = simulator.run(&job).unwrap();
-        (ran.outputs.chunks(n_obs).map(<[f64]>::to_vec).collect(), ran.state)
+        (ran.outputs.chunks(n_obs).map(<[f64]>::to_vec).collect(), ran.state.into_vec())
     }
 
     /// The state at a time, from a state.

@@ -191,5 +191,11 @@ pub(crate) fn setup(solvers: &Solvers, def: &SolverDef) -> Setup {
 pub(crate) fn job(state: Option<Vec<f64>>) -> Job {
     let times = vec![0.1, 0.2, 0.3];
     let window = Window::free(0.0, times, 2, Vec::new());
-    Job { particle: 3, record: 0, window: Arc::new(window), theta: vec![30.0, 0.5], state }
+    Job {
+        particle: 3,
+        record: 0,
+        window: Arc::new(window),
+        theta: vec![30.0, 0.5],
+        state: state.map(Into::into),
+    }
 }

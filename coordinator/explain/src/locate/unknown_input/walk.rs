@@ -106,7 +106,13 @@ impl Walk<'_> {
 
     fn job(&self, window: &Arc<Window>, state: Option<Vec<f64>>, input: f64) -> Job {
         let theta = self.theta.iter().copied().chain([input]).collect();
-        Job { particle: 0, record: self.record as u32, window: Arc::clone(window), theta, state }
+        Job {
+            particle: 0,
+            record: self.record as u32,
+            window: Arc::clone(window),
+            theta,
+            state: state.map(Into::into),
+        }
     }
 
     /// The state at the record's start.
@@ -122,7 +128,7 @@ impl Walk<'_> {
         let outcomes = fleet.run(self.candidate.setup, vec![self.job(&window, None, 0.0)]);
         let outcomes = outcomes.map_err(|error| fleet_failure(self.study, error))?;
         let prediction = predictions(self.study, self.record, &window, outcomes).pop().flatten();
-        Ok(prediction.map(|p| p.state))
+        Ok(prediction.map(|p| p.state.into_vec()))
     }
 
     fn begin(&self, roukf: &Roukf, start: &[f64], intensity: f64, windows: usize) -> Forward {
