@@ -73,6 +73,18 @@ fn an_outlier_counts_as_missing_and_is_told_with_its_line() {
 }
 
 #[test]
+fn a_first_or_last_value_that_stands_apart_is_kept_and_told_with_its_line() {
+    let first = cooling(&[(0, 3.0)], "noise = 0.05").study();
+    assert_eq!(missing(&first), [0; 0]);
+    let [told] = first.warnings.as_slice() else { panic!("{:?}", first.warnings) };
+    let begins = "the first value in column `body` of record `monday` (line 2 of `cooling.csv`) stands apart";
+    assert!(told.starts_with(begins) && told.contains("empty the cell of a fault"), "{told}");
+    let both = cooling(&[(0, 3.0), (119, -3.0)], "noise = 0.05").study();
+    assert!(both.warnings[0].contains("and so does one more at an end of a column"), "{:?}", both.warnings);
+    assert!(cooling(&[(0, 3.0)], "noise = 0.05, outliers = \"keep\"").study().warnings.is_empty());
+}
+
+#[test]
 fn it_is_kept_where_the_channel_says_so_and_where_too_many_are_like_it() {
     let kept = cooling(&SPIKES, "noise = 0.05, outliers = \"keep\"").study();
     assert_eq!((missing(&kept).len(), kept.warnings.len()), (0, 0));

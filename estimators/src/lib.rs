@@ -73,7 +73,7 @@ pub use identifiability::{
 pub use kind::{Form, Kind, MakeFilter, Options, Slope};
 pub use least_squares::{End, LeastSquares, Need, Scaled};
 pub use linearisation::Linearisation;
-pub use outliers::{Outlier, are_too_many, outliers};
+pub use outliers::{Outlier, are_too_many, ends_apart, outliers};
 pub use particles::Particles;
 pub use pooled::Pooled;
 pub use recombine::{Recombination, recombine};

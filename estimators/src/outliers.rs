@@ -39,35 +39,85 @@ pub struct Outlier {
 ///
 /// The first two and the last two values are none, beside which a step that comes at once looks the same; nor is any among fewer than twenty.
 pub fn outliers(times: &[f64], values: &[f64], noise: Option<f64>) -> Vec<Outlier> {
-    let known: Vec<usize> = (0..values.len()).filter(|at| values[*at].is_finite()).collect();
-    let n = known.len();
-    if n < FEWEST {
-        return Vec::new();
-    }
-    // The distance of value i from the line through values a and b.
-    let from_line = |i: usize, a: usize, b: usize| {
-        let [i, a, b] = [i, a, b].map(|k| known[k]);
-        let part = (times[i] - times[a]) / (times[b] - times[a]);
-        values[i] - (values[a] + (values[b] - values[a]) * part)
-    };
-    let distances: Vec<f64> = (1..n - 1).map(|i| from_line(i, i - 1, i + 1).abs()).collect();
-    let scatter = (median(distances.iter().copied()) / MEDIAN_ABSOLUTE)
-        .max(OF_NOISE * noise.unwrap_or(0.0))
-        .max(step(values, &known));
-    let is_far = |i: &usize| distances[i - 1] > FAR * scatter;
+    let Some(course) = Course::of(times, values, noise) else { return Vec::new() };
+    let n = course.known.len();
     // What the two neighbours on either side are from their course without it, as far as there are any.
     let beside = |i: usize| {
         let before =
             [(2, i - 1, i + 1), (3, i - 2, i - 1)].map(|(back, k, b)| (k, i.checked_sub(back), Some(b)));
         let after = [(2, i + 1, i - 1), (3, i + 2, i + 1)].map(|(on, k, a)| (k, Some(a), Some(i + on)));
         let of = before.into_iter().chain(after).filter_map(|(k, a, b)| Some((k, a?, b.filter(|b| *b < n)?)));
-        of.map(|(k, a, b)| from_line(k, a, b).abs()).fold(0.0, f64::max)
+        of.map(|(k, a, b)| course.off_line(k, a, b).abs()).fold(0.0, f64::max)
     };
-    let is_alone = |i: &usize| distances[i - 1] > ALONE * beside(*i);
-    let found = (2..n - 2).filter(is_far).filter(is_alone);
-    found
-        .map(|i| Outlier { at: known[i], distance: distances[i - 1], times: distances[i - 1] / scatter })
-        .collect()
+    let is_alone = |i: &usize| course.distance(*i) > ALONE * beside(*i);
+    let found = (2..n - 2).filter(|i| course.is_far(*i)).filter(is_alone);
+    found.map(|i| course.outlier(i, course.distance(i))).collect()
+}
+
+/// The first and the last value, where they stand apart from the course of those beside them, as these do not: by a fault, or since the signal
+/// changed within one sample. Times and noise as in [`outliers`]; the distance is that from the line through the two next values.
+pub fn ends_apart(times: &[f64], values: &[f64], noise: Option<f64>) -> [Option<Outlier>; 2] {
+    let Some(course) = Course::of(times, values, noise) else { return [None; 2] };
+    let last = course.known.len() - 1;
+    // An end is as far from the line through the next two as the one beside it from the line through the end, but for the spacing.
+    let apart = |end: usize, [next, second, third]: [usize; 3]| {
+        let of_others = course.distance(second).max(course.distance(third));
+        (course.is_far(next) && course.distance(next) > ALONE * of_others).then(|| {
+            let distance = course.off_line(end, next, second).abs();
+            Outlier { times: course.distance(next) / course.scatter, ..course.outlier(end, distance) }
+        })
+    };
+    [apart(0, [1, 2, 3]), apart(last, [1, 2, 3].map(|k| last - k))]
+}
+
+/// A series as the distances of its values from the lines through their neighbours.
+struct Course<'a> {
+    times: &'a [f64],
+    values: &'a [f64],
+    /// Places of the values that are not missing.
+    known: Vec<usize>,
+    /// Of each of them but the ends.
+    distances: Vec<f64>,
+    /// Standard deviation of the distances.
+    scatter: f64,
+}
+
+impl<'a> Course<'a> {
+    /// `None` where there are too few values.
+    fn of(times: &'a [f64], values: &'a [f64], noise: Option<f64>) -> Option<Self> {
+        let known: Vec<usize> = (0..values.len()).filter(|at| values[*at].is_finite()).collect();
+        let n = known.len();
+        if n < FEWEST {
+            return None;
+        }
+        let mut course = Self { times, values, known, distances: Vec::new(), scatter: 0.0 };
+        course.distances = (1..n - 1).map(|i| course.off_line(i, i - 1, i + 1).abs()).collect();
+        course.scatter = (median(course.distances.iter().copied()) / MEDIAN_ABSOLUTE)
+            .max(OF_NOISE * noise.unwrap_or(0.0))
+            .max(step(values, &course.known));
+        Some(course)
+    }
+
+    /// The distance of value i from the line through values a and b.
+    fn off_line(&self, i: usize, a: usize, b: usize) -> f64 {
+        let (times, values) = (self.times, self.values);
+        let [i, a, b] = [i, a, b].map(|k| self.known[k]);
+        let part = (times[i] - times[a]) / (times[b] - times[a]);
+        values[i] - (values[a] + (values[b] - values[a]) * part)
+    }
+
+    /// The distance of a value that is no end.
+    fn distance(&self, i: usize) -> f64 {
+        self.distances[i - 1]
+    }
+
+    fn is_far(&self, i: usize) -> bool {
+        self.distance(i) > FAR * self.scatter
+    }
+
+    fn outlier(&self, i: usize, distance: f64) -> Outlier {
+        Outlier { at: self.known[i], distance, times: distance / self.scatter }
+    }
 }
 
 /// Whether so many outliers of a series are too many to be faults of single values: the signal has pulses then, or its noise heavy tails.
@@ -139,6 +189,29 @@ mod tests {
         assert!((one.distance - 5.0).abs() < 0.3, "{one:?}");
         // Noise of 0.05 leaves distances of 0.061.
         assert!((one.times - 5.0 / 0.0612).abs() < 20.0, "{one:?}");
+    }
+
+    #[test]
+    fn an_end_that_stands_apart_is_told_and_one_beside_it_that_does_is_not_taken_for_it() {
+        let at = |values: &[f64]| {
+            ends_apart(&times(values.len()), values, None).map(|end| end.map(|outlier| outlier.at))
+        };
+        let clean = noisy(|t| 3.0 * t.sin(), 7);
+        assert_eq!(at(&clean), [None, None]);
+        let mut values = clean.clone();
+        (values[0], values[299]) = (values[0] + 2.0, values[299] - 2.0);
+        assert_eq!(at(&values), [Some(0), Some(299)]);
+        let [Some(first), _] = ends_apart(&times(300), &values, None) else { panic!("it is told") };
+        assert!((first.distance - 2.0).abs() < 0.4 && first.times > 10.0, "{first:?}");
+        assert_eq!(found(&values), [0; 0], "it is told and no more");
+        // What is missing before the first value and after the last one changes nothing.
+        (values[0], values[299]) = (f64::NAN, f64::NAN);
+        assert_eq!(at(&values), [None, None]);
+        (values[1], values[298]) = (values[1] + 2.0, values[298] - 2.0);
+        assert_eq!(at(&values), [Some(1), Some(298)]);
+        let mut beside = clean;
+        (beside[1], beside[298]) = (beside[1] + 2.0, beside[298] - 2.0);
+        assert_eq!(at(&beside), [None, None]);
     }
 
     #[test]

@@ -1,8 +1,9 @@
-//! Values that stand apart from all around them, which no course of a system explains: they count as missing, and are told.
+//! Values that stand apart from all around them, which no course of a system explains: they count as missing, and are told. The first and the
+//! last value are told alone: there a change of the signal looks the same.
 //!
 //! Next file to read: `outliers.rs` of the estimators, for what is one.
 
-use starlings_estimators::{Outlier, are_too_many, outliers};
+use starlings_estimators::{Outlier, are_too_many, ends_apart, outliers};
 use starlings_models::quoted_list;
 use starlings_models::units::rounded;
 
@@ -24,8 +25,13 @@ impl ChannelReader<'_> {
             return None;
         }
         let noise = *section.noise.get_ref();
-        let (mut left_out, mut too_many) = (Vec::new(), Vec::new());
+        let (mut left_out, mut too_many, mut ends) = (Vec::new(), Vec::new(), Vec::new());
         for (values, part) in measured {
+            let [first, last] = ends_apart(&self.table.times, values, noise);
+            let of_part = [("first", first), ("last", last)];
+            ends.extend(
+                of_part.into_iter().filter_map(|(which, end)| Some((which, end?, part.column.clone()))),
+            );
             let found = outliers(&self.table.times, values, noise);
             if are_too_many(&found, values) {
                 too_many.push((found.len(), values.len(), part.column.clone()));
@@ -36,7 +42,7 @@ impl ChannelReader<'_> {
                 left_out.push((outlier, part.column.clone()));
             }
         }
-        let said = [self.said_left_out(&left_out), self.said_kept(&too_many)];
+        let said = [self.said_left_out(&left_out), self.said_kept(&too_many), self.said_ends(&ends)];
         let said: Vec<String> = said.into_iter().flatten().collect();
         (!said.is_empty()).then(|| said.join("; "))
     }
@@ -73,6 +79,24 @@ impl ChannelReader<'_> {
             "{found} of {n} values in column `{column}` of record `{}` stand apart from their neighbours, too many to be left out as faults of \
              single values: the signal has pulses, or its noise heavy tails; empty the cells of those that are faults",
             self.name()
+        ))
+    }
+
+    fn said_ends(&self, ends: &[(&str, Outlier, String)]) -> Option<String> {
+        let (which, end, column) = ends.first()?;
+        let more = match ends.len() {
+            1 => "",
+            2 => ", and so does one more at an end of a column",
+            _ => ", and so do others at ends of columns",
+        };
+        Some(format!(
+            "the {which} value in column `{column}` of record `{}` (line {} of `{}`) stands apart from the course of those beside it, by {} times \
+             the distance that is usual there{more}: a fault of the sensor, which the fit takes for the system's, or a change within one sample; empty \
+             the cell of a fault, and `outliers = \"keep\"` in the channel says that it is none",
+            self.name(),
+            self.table.csv.line(end.at),
+            self.section.file.get_ref(),
+            rounded(end.times, 2),
         ))
     }
 }
