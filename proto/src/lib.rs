@@ -4,7 +4,7 @@
 //! outside, in which unit and shape. [`generated`] and [`generated_solver`] are generated from them; [`convert`] alone looks inside
 //! and checks and translates them. [`access`] is the file by which both sides know each other, [`socket`] the connection of workers
 //! that one process started, [`descriptors`] what is passed beside it, [`driven`] the network of a process, driven by whoever waits
-//! for it. No scheduling here. Next file to read: [`convert`].
+//! for it, [`batch`] how the system knows a thread that computes. No scheduling here. Next file to read: [`convert`].
 
 pub mod access;
 pub mod adapters;

@@ -68,9 +68,9 @@ pub fn not_finite(bytes: &[u8]) -> Option<f64> {
     const EXPONENT: u64 = 0x7ff0_0000_0000_0000;
     const SIGN: u64 = 1 << 63;
     let words = bytes.as_chunks::<8>().0;
-    // One more in the exponent runs over into the sign, which was taken off, only where all its bits are set.
+    // One more in the exponent reaches the sign, which was taken off, only where all its bits are set.
     let run_over = |word: &[u8; 8]| (u64::from_le_bytes(*word) & EXPONENT).wrapping_add(1 << 52);
-    // Without a way out of the loop several values are looked at together, by what every processor of this kind can.
+    // Without a way out of the loop several values are looked at together.
     if words.iter().fold(0, |any, word| any | run_over(word)) < SIGN {
         return None;
     }

@@ -38,7 +38,7 @@ pub use run::Run;
 pub struct Solved {
     /// Predicted outputs, laid out as [`Window::observed`].
     pub outputs: Vec<f64>,
-    /// StateValues at the last time, after the observer's correction; empty from a program that cannot restart.
+    /// State at the last time, after the observer's correction; empty from a program that cannot restart.
     pub state: Vec<f64>,
 }
 

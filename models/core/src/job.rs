@@ -56,7 +56,7 @@ pub struct Job<S = StateValues> {
     pub window: Arc<Window>,
     /// Parameter values in physical units, in the order of [`crate::Setup::parameters`].
     pub theta: Vec<f64>,
-    /// StateValues at `window.start`; `None` starts from the model's initial state.
+    /// State at `window.start`; `None` starts from the model's initial state.
     pub state: Option<S>,
 }
 
@@ -82,7 +82,7 @@ impl<S> Job<S> {
 pub struct Prediction<S = StateValues> {
     /// Predicted outputs, `n_obs × n_times`, laid out as [`Window::observed`]; recorded before any correction.
     pub outputs: Vec<f64>,
-    /// StateValues at the window's end, after the observer's correction.
+    /// State at the window's end, after the observer's correction.
     pub state: S,
     /// Wall time of the run in seconds, measured by the worker; zero from a bare model, which knows no clock.
     pub cost: f64,
