@@ -31,7 +31,7 @@ use crate::screen::candidates::candidates;
 use crate::screen::proposals::{self, Proposals};
 use crate::screen::residual_timing::Timing;
 use crate::screen::resolve::{kinded, resolved_candidates};
-use crate::tell::words;
+use crate::tell::stand::stand;
 
 /// A search with its verdict.
 pub(super) struct Diagnosis<'a, 'c> {
@@ -237,7 +237,7 @@ fn fit_as_it_is<'c>(
         return Err(ExplainError::Baseline(reason));
     }
     if !fit.has_converged() && !options.force {
-        return Err(ExplainError::NotConverged { iterations: fit.trials(), stand: words::stand(&fit) });
+        return Err(ExplainError::NotConverged { iterations: fit.trials(), stand: stand(&fit) });
     }
     fit.measure_own_values(cache)?;
     Ok(fit)

@@ -6,15 +6,11 @@
 use starlings_models::quoted_list;
 use std::fmt::Write as _;
 
-use starlings_estimators::correlation;
-use starlings_study::{CORRELATED, posterior};
-
 use super::correlated::{correlated_noise, listed as listed_noise, sentence as noise_sentence};
 use super::errors::shrinking;
 use super::result::CorrelatedChannel;
 use super::tie::{first, tied};
 use crate::fit::candidate::Candidate;
-use crate::fit::fitted_variant::FittedVariant;
 use crate::fit::kind::Kind;
 use crate::judge::adequacy::Nature;
 use crate::judge::gates::JudgedFit;
@@ -22,46 +18,12 @@ use crate::judge::held_out::{HeldOut, listed};
 use crate::judge::search_result::SearchResult;
 use crate::judge::verdict::{Decision, Verdict};
 use crate::locate::Located;
-use crate::number::{factor, percent, times};
+use crate::number::{percent, times};
 use crate::run_cache::RunCache;
 use crate::screen::not_tried;
 
 /// Share of the gap below which what is left is not spoken of: with one digit it would read as nothing.
 const LITTLE: f64 = 5e-4;
-
-/// Where a fit stands that has not converged.
-pub(crate) fn stand(fit: &FittedVariant<'_>) -> String {
-    let n = fit.residual().len().max(1) as f64;
-    let rms = (fit.residual().norm_squared() / n).sqrt();
-    format!("{} (root mean square residual {} noise sd){}", values(fit), factor(rms), exchanged(fit))
-}
-
-/// The two parameters that stand in for each other most, where they do.
-fn exchanged(fit: &FittedVariant<'_>) -> String {
-    let Ok(optimum) = fit.optimum() else { return String::new() };
-    let theta = &fit.variant.study.theta;
-    let correlation = correlation(optimum.covariance());
-    let pairs = (0..correlation.nrows()).flat_map(|j| (0..j).map(move |i| (i, j)));
-    let strength = |(i, j): &(usize, usize)| correlation[(*i, *j)].abs();
-    let strong = pairs.filter(|pair| strength(pair) > CORRELATED);
-    let Some((i, j)) = strong.max_by(|a, b| strength(a).total_cmp(&strength(b))) else {
-        return String::new();
-    };
-    let value = correlation[(i, j)];
-    format!(
-        ", where {} and {} stand in for each other (correlation {value:.4}): fix one or give it a narrower prior",
-        theta[i].name, theta[j].name
-    )
-}
-
-/// The posterior's names and values in words, for a fit that has not converged.
-fn values(fit: &FittedVariant<'_>) -> String {
-    let theta = fit.theta();
-    let zero = vec![0.0; theta.len()];
-    let gaussian = posterior::independent(theta.as_slice(), &zero);
-    let estimates = posterior::estimates(&fit.variant.study, &gaussian);
-    estimates.iter().map(|e| format!("{} = {:.5}", e.name, e.estimate)).collect::<Vec<_>>().join(", ")
-}
 
 /// The verdict in a few sentences.
 pub(crate) fn headline(
