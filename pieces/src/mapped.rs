@@ -1,6 +1,6 @@
 //! Memory that another process may write at any time, seen by its addresses: copied into and out of, never borrowed.
 //!
-//! A copy through a mapping costs a third of a call that reads or writes. The length of what is mapped is sealed, so no address of it
+//! A copy through a mapping costs less than a call that reads or writes. The length of what is mapped is sealed, so no address of it
 //! is without a page; a page that the system has not given yet it gives at the first touch. Next file to read: `memory`.
 
 use std::io;

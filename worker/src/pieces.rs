@@ -122,3 +122,23 @@ impl AsRef<[f64]> for InPlace {
         bytemuck::cast_slice(self.0.bytes())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sealed_state_is_read_where_it_stands_and_outlives_its_descriptor() {
+        let values = [1.5, -0.0, f64::MAX];
+        let memory = SharedMemory::of(24).expect("room");
+        fill(&values, |bytes, at| memory.write(bytes, at)).expect("it is not sealed");
+        let copied = seen(&memory, 3).expect("it is there");
+        assert!(copied == values && copied.into_own().is_some(), "what may change is copied");
+        memory.seal().expect("nobody has mapped it");
+        let state = seen(&memory, 3).expect("it is there");
+        drop(memory);
+        let bits = |values: &[f64]| values.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
+        assert_eq!(bits(&state), bits(&values));
+        assert!(state.into_own().is_none(), "nothing was copied");
+    }
+}

@@ -223,13 +223,9 @@ impl Fleet for GrpcFleet {
     }
 
     fn run_mixed(&mut self, jobs: Vec<(SetupId, Job)>) -> Result<Vec<Outcome>, FleetError> {
-        let jobs =
-            jobs.into_iter().map(|(setup, job)| (setup, job.map(|state| Held::Values(state.into_vec()))));
+        let jobs = jobs.into_iter().map(|(setup, job)| (setup, job.map(Held::from)));
         let outcomes = self.run_held(jobs.collect())?;
-        outcomes
-            .into_iter()
-            .map(|outcome| Ok(outcome.try_map(|state| state.into_values().map(Into::into))?))
-            .collect()
+        outcomes.into_iter().map(|outcome| Ok(outcome.try_map(Held::for_model)?)).collect()
     }
 
     fn run_held(&mut self, jobs: Vec<(SetupId, Job<Held>)>) -> Result<Vec<Outcome<Held>>, FleetError> {

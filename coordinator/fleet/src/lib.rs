@@ -121,14 +121,9 @@ pub trait Fleet {
     /// # Errors
     /// As [`Fleet::run_mixed`], and when a state cannot be kept or read.
     fn run_held(&mut self, jobs: Vec<(SetupId, Job<Held>)>) -> Result<Vec<Outcome<Held>>, FleetError> {
-        let jobs = jobs
-            .into_iter()
-            .map(|(setup, job)| Ok((setup, job.try_map(|state| state.into_values().map(Into::into))?)));
+        let jobs = jobs.into_iter().map(|(setup, job)| Ok((setup, job.try_map(Held::for_model)?)));
         let outcomes = self.run_mixed(jobs.collect::<Result<_, StateError>>()?)?;
-        outcomes
-            .into_iter()
-            .map(|outcome| outcome.try_map(|state| Ok(Held::Values(state.into_vec()))))
-            .collect()
+        outcomes.into_iter().map(|outcome| outcome.try_map(|state| Ok(state.into()))).collect()
     }
 
     /// As [`Fleet::run_held`], and tells of outcomes while the batch goes on: every [`TELL_EVERY`], also when there are none, of

@@ -40,7 +40,7 @@ fn assert_runs(shared: &mut Shared) {
     let outcomes = shared.fleet.run_held(jobs.collect()).unwrap();
     for ((k, state), outcome) in (0..).zip(&states).zip(outcomes) {
         let values = state.values().unwrap();
-        let job = job(k, Held::Values(values)).map(|state| state.into_values().unwrap().into());
+        let job = job(k, Held::Values(values)).try_map(Held::for_model).unwrap();
         let ended = outcome.result.unwrap().state;
         assert!(matches!(&ended, Held::Stored(_)));
         assert!(ended.into_values().unwrap() == moved(&job).state, "particle {k}");

@@ -50,8 +50,7 @@ fn states_in_the_store_go_from_batch_to_batch_without_their_values() {
     let _workers = [1, 2].map(|_| ThreadWorker::start(address, models()));
     let setup = fleet.install(&Setup::default()).unwrap();
     let mut now = jobs(6);
-    let mut held: Vec<Job<Held>> =
-        now.iter().cloned().map(|job| job.map(|x| Held::Values(x.into_vec()))).collect();
+    let mut held: Vec<Job<Held>> = now.iter().cloned().map(|job| job.map(Held::from)).collect();
     for _ in 0..3 {
         let outcomes = fleet.run_held(held.iter().map(|job| (setup, job.clone())).collect()).unwrap();
         for ((job, held), outcome) in now.iter_mut().zip(&mut held).zip(outcomes) {

@@ -1,5 +1,6 @@
 //! A state as the coordinator holds it: its values while it is small, the store's above that.
 
+use starlings_models::StateValues;
 use starlings_proto::{InKey, MAX_INLINE_STATE};
 
 use crate::{StateError, StateStore, StoredState};
@@ -22,6 +23,12 @@ impl Default for Held {
 impl From<Vec<f64>> for Held {
     fn from(values: Vec<f64>) -> Self {
         Self::Values(values)
+    }
+}
+
+impl From<StateValues> for Held {
+    fn from(values: StateValues) -> Self {
+        Self::Values(values.into_vec())
     }
 }
 
@@ -52,6 +59,14 @@ impl Held {
             Self::Values(values) => Ok(values),
             Self::Stored(state) => state.values(),
         }
+    }
+
+    /// The state as a model sees it.
+    ///
+    /// # Errors
+    /// As [`Held::into_values`].
+    pub fn for_model(self) -> Result<StateValues, StateError> {
+        self.into_values().map(StateValues::from)
     }
 
     /// The same state, in the store where it is too large to travel inside a message.

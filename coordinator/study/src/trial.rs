@@ -145,9 +145,9 @@ struct Here<'a>(&'a dyn Forward);
 impl Runner for Here<'_> {
     fn run(&self, job: Job<Held>) -> Result<Prediction<Held>, ParticleError> {
         let lost = |error: starlings_fleet::StateError| ParticleError::Infrastructure(error.to_string());
-        let job = job.try_map(|state| state.into_values().map(Into::into)).map_err(lost)?;
+        let job = job.try_map(Held::for_model).map_err(lost)?;
         let until = Until { spent: &spent(), stop: &Stop::default(), traceparent: None };
-        self.0.run_within(&job, &until)?.try_map(|state| Ok(Held::Values(state.into_vec())))
+        self.0.run_within(&job, &until)?.try_map(|state| Ok(state.into()))
     }
 }
 

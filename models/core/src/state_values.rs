@@ -57,12 +57,6 @@ impl From<Vec<f64>> for StateValues {
     }
 }
 
-impl From<StateValues> for Vec<f64> {
-    fn from(values: StateValues) -> Self {
-        values.into_vec()
-    }
-}
-
 impl FromIterator<f64> for StateValues {
     fn from_iter<I: IntoIterator<Item = f64>>(values: I) -> Self {
         values.into_iter().collect::<Vec<_>>().into()

@@ -194,8 +194,7 @@ impl RunCache<'_> {
         };
         self.report_stage("", jobs.len());
         // Nobody reads the states that whole records end in.
-        let held =
-            jobs.into_iter().map(|(setup, job)| (setup, job.map(|state| Held::Values(state.into_vec()))));
+        let held = jobs.into_iter().map(|(setup, job)| (setup, job.map(Held::from)));
         let outcomes = self.fleet.run_telling(held.collect(), &mut |early| arrivals.take_early(early));
         let Arrivals { mut early, refused, .. } = arrivals;
         // The events are kept even if the runs end in an error.

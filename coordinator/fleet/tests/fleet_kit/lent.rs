@@ -19,7 +19,7 @@ pub fn fleet(memory: usize) -> (GrpcFleet, StateStore, Receiver<FleetEvent>) {
 /// Runs this particle alone; the state that came of it.
 pub fn run(fleet: &mut GrpcFleet, particle: u32) -> Held {
     let setup = fleet.install(&Setup::default()).unwrap();
-    let job = job(particle, 1).try_map(|x| Ok::<_, ()>(Held::Values(x.into_vec()))).unwrap();
+    let job = job(particle, 1).map(Held::from);
     fleet.run_held(vec![(setup, job)]).unwrap().remove(0).result.unwrap().state
 }
 
